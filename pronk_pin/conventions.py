@@ -1,0 +1,173 @@
+"""Conversions between the orders and frames of Pinocchio, MuJoCo and the paper.
+
+The only module that knows more than one convention. Joints are matched by name, never by slice.
+
+=============  ==================  =====================================================
+convention     order of the legs   floating base
+=============  ==================  =====================================================
+Pinocchio      FL, FR, RL, RR      quaternion xyzw; velocity in the body frame
+MuJoCo         as in the URDF      quaternion wxyz; linear velocity in the world, angular
+                                   velocity in the body frame
+paper          FR, FL, RR, RL      (joints only)
+=============  ==================  =====================================================
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ._typing import Array, IntArray
+from .errors import InvalidInput
+from .robot import JOINTS, Robot
+
+PAPER_LEGS = ("FR", "FL", "RR", "RL")
+"""Order of the legs in the paper, section II.A."""
+
+
+class MujocoState(NamedTuple):
+    """A state in MuJoCo's convention; a field is None where nothing was given."""
+
+    qpos: Array
+    """Positions, shape (..., 19): world position, quaternion wxyz, joints."""
+    qvel: Array | None
+    """Velocities, shape (..., 18): linear in the world, angular in the body, joints."""
+    qacc: Array | None
+    """Accelerations, shape (..., 18), in the frames of qvel."""
+    ctrl: Array | None
+    """Motor torques [N m], shape (..., 12)."""
+
+
+class PinocchioState(NamedTuple):
+    """A state in Pinocchio's convention; a field is None where nothing was given."""
+
+    q: Array
+    """Configuration, shape (..., 19): world position, quaternion xyzw, joints."""
+    v: Array | None
+    """Velocity, shape (..., 18): linear and angular in the body frame, joints."""
+    a: Array | None
+    """Acceleration, shape (..., 18): the time derivative of v."""
+    tau: Array | None
+    """Motor torques [N m], shape (..., 12)."""
+
+
+def joint_order(names: tuple[str, ...], wanted: tuple[str, ...]) -> IntArray:
+    """Indices that pick `wanted` out of `names`: `x_wanted = x_names[..., indices]`."""
+    if sorted(names) != sorted(wanted):
+        raise InvalidInput(
+            f"the joints {', '.join(names)} and {', '.join(wanted)} are not the same; "
+            "both must name the robot's joints"
+        )
+    return np.array([names.index(name) for name in wanted], dtype=np.intp)
+
+
+def to_mujoco(
+    robot: Robot,
+    q: Array,
+    v: Array | None = None,
+    a: Array | None = None,
+    tau: Array | None = None,
+) -> MujocoState:
+    """Convert a state of the floating-base robot from Pinocchio to MuJoCo; batched.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (..., 19).
+        v: Velocity, shape (..., 18); needed where `a` is given.
+        a: Acceleration, shape (..., 18).
+        tau: Motor torques [N m], shape (..., 12).
+
+    Raises:
+        InvalidInput: A shape does not fit, or `a` comes without `v`.
+    """
+    q, v, a, tau = _checked(robot, q, v, a, tau)
+    order = joint_order(robot.joint_names, robot.urdf_joint_names)
+    rotation = rotation_matrix(q[..., 3:7])
+    qpos = np.concatenate([q[..., :3], q[..., [6, 3, 4, 5]], q[..., 7:][..., order]], axis=-1)
+    qvel = qacc = None
+    if v is not None:
+        linear = _rotate(rotation, v[..., :3])
+        qvel = np.concatenate([linear, v[..., 3:6], v[..., 6:][..., order]], axis=-1)
+    if a is not None and v is not None:
+        # The world acceleration is the body acceleration plus the transport term.
+        linear = _rotate(rotation, a[..., :3] + np.cross(v[..., 3:6], v[..., :3]))
+        qacc = np.concatenate([linear, a[..., 3:6], a[..., 6:][..., order]], axis=-1)
+    return MujocoState(qpos, qvel, qacc, None if tau is None else tau[..., order])
+
+
+def from_mujoco(
+    robot: Robot,
+    qpos: Array,
+    qvel: Array | None = None,
+    qacc: Array | None = None,
+    ctrl: Array | None = None,
+) -> PinocchioState:
+    """Convert a state of the floating-base robot from MuJoCo to Pinocchio; batched.
+
+    The inverse of `to_mujoco`; arguments and errors are those of its result.
+    """
+    qpos, qvel, qacc, ctrl = _checked(robot, qpos, qvel, qacc, ctrl)
+    order = joint_order(robot.urdf_joint_names, robot.joint_names)
+    q = np.concatenate([qpos[..., :3], qpos[..., [4, 5, 6, 3]], qpos[..., 7:][..., order]], axis=-1)
+    inverse = np.swapaxes(rotation_matrix(q[..., 3:7]), -1, -2)
+    v = a = None
+    if qvel is not None:
+        linear = _rotate(inverse, qvel[..., :3])
+        v = np.concatenate([linear, qvel[..., 3:6], qvel[..., 6:][..., order]], axis=-1)
+    if qacc is not None and v is not None:
+        linear = _rotate(inverse, qacc[..., :3]) - np.cross(v[..., 3:6], v[..., :3])
+        a = np.concatenate([linear, qacc[..., 3:6], qacc[..., 6:][..., order]], axis=-1)
+    return PinocchioState(q, v, a, None if ctrl is None else ctrl[..., order])
+
+
+def to_paper(robot: Robot, joints: Array) -> Array:
+    """Joint quantities (..., 12) in the paper's order of legs."""
+    return np.asarray(joints)[..., joint_order(robot.joint_names, _paper_names(robot))]
+
+
+def from_paper(robot: Robot, joints: Array) -> Array:
+    """Joint quantities (..., 12) from the paper's order of legs to Pinocchio's."""
+    return np.asarray(joints)[..., joint_order(_paper_names(robot), robot.joint_names)]
+
+
+def rotation_matrix(quaternion: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions xyzw (..., 4)."""
+    x, y, z, w = np.moveaxis(quaternion, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _paper_names(robot: Robot) -> tuple[str, ...]:
+    pattern = robot.spec.joint_pattern
+    return tuple(pattern.format(leg=leg, joint=joint) for leg in PAPER_LEGS for joint in JOINTS)
+
+
+def _rotate(rotation: Array, vector: Array) -> Array:
+    return np.einsum("...ij,...j->...i", rotation, vector)
+
+
+def _checked(
+    robot: Robot, q: Array, v: Array | None, a: Array | None, tau: Array | None
+) -> tuple[Array, Array | None, Array | None, Array | None]:
+    """Arrays of the right sizes and one batch shape, with a unit quaternion."""
+    sizes = (robot.nq, robot.nv, robot.nv, robot.nu)
+    arrays = [None if x is None else np.asarray(x, dtype=float) for x in (q, v, a, tau)]
+    first = arrays[0]
+    assert first is not None
+    for array, size in zip(arrays, sizes, strict=True):
+        if array is not None and array.shape != (*first.shape[:-1], size):
+            raise InvalidInput(f"shape {array.shape} where (..., {size}) is expected")
+    if a is not None and v is None:
+        raise InvalidInput("an acceleration changes frames only with its velocity; give both")
+    norm = np.linalg.norm(first[..., 3:7], axis=-1)
+    if not np.allclose(norm, 1.0, atol=1e-6):
+        raise InvalidInput(
+            f"the base quaternion has norm {np.ravel(norm)[0]:.6g}; normalise it first "
+            "(pinocchio.normalize)"
+        )
+    return first, arrays[1], arrays[2], arrays[3]

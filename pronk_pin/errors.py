@@ -1,0 +1,96 @@
+"""Every error that pronk_pin raises on purpose.
+
+Each class carries what is needed to investigate, and its message names the remedy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class PronkError(Exception):
+    """Base class of all errors of this package."""
+
+
+class UnknownName(PronkError):
+    """A robot, controller, scenario or the like that does not exist.
+
+    Attributes:
+        kind: What was looked for, as in "controller".
+        name: The name that was given.
+        known: The names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        self.kind, self.name, self.known = kind, name, tuple(known)
+        super().__init__(f"unknown {kind} '{name}'; choose one of: {', '.join(self.known)}")
+
+
+class InvalidInput(PronkError):
+    """An argument of the wrong shape, type or range; the message says what is expected."""
+
+
+class SpeedOutOfRange(PronkError):
+    """A speed that the gait library does not cover.
+
+    Attributes:
+        speed: The speed asked for [m/s].
+        lowest, highest: The range of the library [m/s].
+    """
+
+    def __init__(self, speed: float, lowest: float, highest: float) -> None:
+        self.speed, self.lowest, self.highest = speed, lowest, highest
+        super().__init__(
+            f"speed {speed:g} m/s is outside the gait library, which covers {lowest:g} to "
+            f"{highest:g} m/s; choose a speed in that range, or extend the library with "
+            "'pronk-pin gaits build'"
+        )
+
+
+class FileProblem(PronkError):
+    """A file or folder that is missing, damaged, or cannot be written.
+
+    Attributes:
+        path: The file or folder.
+        problem: What is wrong with it.
+    """
+
+    def __init__(self, path: Path | str, problem: str, remedy: str) -> None:
+        self.path, self.problem = Path(path), problem
+        super().__init__(f"{path}: {problem}; {remedy}")
+
+
+class GaitNotFound(PronkError):
+    """The gait optimisation did not find a solution.
+
+    Attributes:
+        speed: The speed of the gait [m/s].
+        status: What the solver said.
+        violations: Worst violation of each named constraint.
+    """
+
+    def __init__(self, speed: float, status: str, violations: dict[str, float]) -> None:
+        self.speed, self.status, self.violations = speed, status, dict(violations)
+        worst = sorted(violations.items(), key=lambda item: -item[1])[:3]
+        listed = ", ".join(f"{name} {value:.1e}" for name, value in worst)
+        super().__init__(
+            f"no gait found at {speed:g} m/s ({status}); worst violations: {listed}; relax those, "
+            "or start from a neighbouring speed's solution"
+        )
+
+
+class SimulationDiverged(PronkError):
+    """A simulation left the finite numbers.
+
+    Attributes:
+        step: The step at which it happened.
+        state: The last finite state, for a reproduction.
+    """
+
+    def __init__(self, step: int, state: object) -> None:
+        self.step, self.state = step, state
+        super().__init__(
+            f"the simulation diverged at step {step}; reduce the feedback gains or the "
+            "time step of the scenario"
+        )

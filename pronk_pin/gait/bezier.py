@@ -1,0 +1,89 @@
+"""Bezier polynomials over the phase: eq. (6) of the paper.
+
+Coefficients stand in the last axis: `(..., order + 1)`. The phase `s` runs from 0 to 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import comb
+
+from .._typing import Array
+
+
+def bernstein(s: Array, order: int) -> Array:
+    """Bernstein polynomials of an order at the phases s, shape (len(s), order + 1)."""
+    s = np.atleast_1d(np.asarray(s, dtype=float))[:, None]  # (n, 1)
+    i = np.arange(order + 1)
+    return np.asarray(comb(order, i) * s**i * (1.0 - s) ** (order - i))
+
+
+def evaluate(coefficients: Array, s: Array, *, derivative: int = 0) -> Array:
+    """Values, or derivatives by s, at the phases s.
+
+    Args:
+        coefficients: Bezier coefficients, shape (..., order + 1).
+        s: Phases, shape (n,).
+        derivative: How often to differentiate by s.
+
+    Returns:
+        Shape (n, ...).
+    """
+    for _ in range(derivative):
+        coefficients = differentiate(coefficients)
+    basis = bernstein(s, coefficients.shape[-1] - 1)  # (n, order + 1)
+    return np.asarray(np.tensordot(basis, coefficients, axes=([1], [coefficients.ndim - 1])))
+
+
+def differentiate(coefficients: Array) -> Array:
+    """Coefficients of the derivative by s, one order lower."""
+    order = coefficients.shape[-1] - 1
+    if order == 0:
+        return np.zeros_like(coefficients)
+    return order * np.diff(coefficients, axis=-1)
+
+
+def fit(
+    s: Array,
+    values: Array,
+    order: int,
+    *,
+    rates: Array | None = None,
+    pinned: int = 0,
+) -> Array:
+    """Least-squares coefficients through samples.
+
+    Args:
+        s: Phases of the samples, from 0 to 1, shape (n,).
+        values: Samples, shape (n, ...).
+        order: Order of the polynomial.
+        rates: Derivatives by s at the samples, shape (n, ...); fitted along where given.
+        pinned: What both ends meet exactly: 0 nothing, 1 the value, 2 the value and the rate.
+
+    Returns:
+        Coefficients, shape (..., order + 1).
+    """
+    shape = values.shape[1:]
+    flat = values.reshape(len(s), -1)
+    basis, target = bernstein(s, order), flat
+    if rates is not None:
+        # d/ds of the basis, written on the same coefficients.
+        lower = bernstein(s, order - 1)
+        slope = order * (np.pad(lower, ((0, 0), (1, 0))) - np.pad(lower, ((0, 0), (0, 1))))
+        flat_rates = rates.reshape(len(s), -1)
+        basis, target = np.vstack([basis, slope]), np.vstack([target, flat_rates])
+    coefficients = np.zeros((order + 1, flat.shape[1]))
+    known: list[int] = []
+    if pinned >= 1:
+        coefficients[0], coefficients[-1] = flat[0], flat[-1]
+        known += [0, order]
+    if pinned >= 2:
+        if rates is None:
+            raise ValueError("pinned=2 needs the rates")
+        coefficients[1] = coefficients[0] + flat_rates[0] / order
+        coefficients[-2] = coefficients[-1] - flat_rates[-1] / order
+        known += [1, order - 1]
+    free = [i for i in range(order + 1) if i not in known]
+    remainder = target - basis @ coefficients
+    coefficients[free] = np.linalg.lstsq(basis[:, free], remainder, rcond=None)[0]
+    return np.asarray(coefficients.T.reshape(*shape, order + 1))

@@ -1,0 +1,168 @@
+"""A gait: what the robot should do over one stride, as Bezier polynomials over the phase.
+
+A stride is a sequence of phases, each with its own set of stance feet. Pronking has two: `stance`
+on all four feet, then `flight` on none; the touchdown impact closes the cycle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import Array
+from ..errors import InvalidInput
+from ..robot import Robot
+from . import bezier
+
+ARRAYS = ("joints", "base", "tau", "lam")
+"""Coefficient arrays of a phase."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A motion sampled at n instants, in Pinocchio's layout.
+
+    Attributes:
+        t: Times from the beginning of the phase [s], shape (n,).
+        q: Configurations, shape (n, 19).
+        v: Velocities, shape (n, 18).
+        a: Accelerations, shape (n, 18).
+        tau: Motor torques [N m], shape (n, 12).
+        lam: Contact forces in the world frame [N], shape (n, 4, 3), zero for feet in the air.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    lam: Array
+
+
+@dataclass(frozen=True)
+class GaitPhase:
+    """One phase of a gait.
+
+    Attributes:
+        name: "stance" or "flight".
+        feet: Legs whose feet stand on the ground.
+        duration: How long the phase lasts [s].
+        joints: Coefficients of the joint angles [rad], shape (12, order + 1): B of eq. (6).
+        base: Coefficients of the trunk's x [m], z [m] and pitch [rad], shape (3, order + 1);
+            x is 0 where the stride begins.
+        tau: Coefficients of the motor torques [N m], shape (12, order + 1).
+        lam: Coefficients of the contact forces in the world frame [N], shape (4, 3, order + 1).
+    """
+
+    name: str
+    feet: tuple[str, ...]
+    duration: float
+    joints: Array
+    base: Array
+    tau: Array
+    lam: Array
+
+    def joint_reference(self, s: Array) -> tuple[Array, Array]:
+        """Joint angles [rad] and velocities [rad/s] at the phases s, each of shape (n, 12)."""
+        position = bezier.evaluate(self.joints, s)
+        rate = bezier.evaluate(self.joints, s, derivative=1)
+        return position, rate / self.duration
+
+    def base_reference(self, s: Array) -> tuple[Array, Array]:
+        """Trunk x, z, pitch [m, m, rad] and their rates at the phases s, each of shape (n, 3)."""
+        position = bezier.evaluate(self.base, s)
+        rate = bezier.evaluate(self.base, s, derivative=1)
+        return position, rate / self.duration
+
+    def motion(self, robot: Robot, s: Array) -> Motion:
+        """The whole-body motion at the phases s, shape (n,)."""
+        s = np.atleast_1d(np.asarray(s, dtype=float))
+        joints, joint_rates = self.joint_reference(s)
+        base, base_rates = self.base_reference(s)
+        joint_acc = bezier.evaluate(self.joints, s, derivative=2) / self.duration**2
+        base_acc = bezier.evaluate(self.base, s, derivative=2) / self.duration**2
+
+        zero = np.zeros(len(s))
+        position = np.stack([base[:, 0], zero, base[:, 1]], axis=-1)
+        q = robot.q_from_base(position, joints, pitch=base[:, 2])
+        cos, sin = np.cos(base[:, 2]), np.sin(base[:, 2])
+        vx, vz, rate = base_rates.T
+        ax, az, pitch_acc = base_acc.T
+        v = np.zeros((len(s), robot.nv))
+        v[:, 0], v[:, 2], v[:, 4] = cos * vx - sin * vz, sin * vx + cos * vz, rate
+        v[:, 6:] = joint_rates
+        a = np.zeros_like(v)
+        # Body-frame derivative: R^T a_world - omega x v_body, with omega along y.
+        a[:, 0] = cos * ax - sin * az - rate * v[:, 2]
+        a[:, 2] = sin * ax + cos * az + rate * v[:, 0]
+        a[:, 4], a[:, 6:] = pitch_acc, joint_acc
+        return Motion(
+            t=s * self.duration,
+            q=q,
+            v=v,
+            a=a,
+            tau=bezier.evaluate(self.tau, s),
+            lam=bezier.evaluate(self.lam, s),
+        )
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A periodic motion of a robot at one speed.
+
+    Attributes:
+        robot: Name of the robot it was made for.
+        speed: Average forward speed of the trunk [m/s].
+        apex: Greatest height of the trunk [m].
+        phases: The phases in their order; the last one ends in the touchdown of the first.
+    """
+
+    robot: str
+    speed: float
+    apex: float
+    phases: tuple[GaitPhase, ...]
+
+    def phase(self, name: str) -> GaitPhase:
+        """The phase of that name."""
+        for phase in self.phases:
+            if phase.name == name:
+                return phase
+        raise InvalidInput(f"the gait has no phase '{name}'")
+
+    @property
+    def stance(self) -> GaitPhase:
+        """The stance phase."""
+        return self.phase("stance")
+
+    @property
+    def flight(self) -> GaitPhase:
+        """The flight phase."""
+        return self.phase("flight")
+
+    @property
+    def duration(self) -> float:
+        """Duration of a stride [s]."""
+        return sum(phase.duration for phase in self.phases)
+
+    def blend(self, other: Gait, weight: float) -> Gait:
+        """Interpolate towards another gait: eq. (12), for coefficients and durations alike.
+
+        Args:
+            other: A gait of the same phases and orders.
+            weight: 0 gives this gait, 1 the other one.
+        """
+
+        def mix(a: float, b: float) -> float:
+            return (1.0 - weight) * a + weight * b
+
+        phases = []
+        for mine, theirs in zip(self.phases, other.phases, strict=True):
+            mixed = {
+                name: (1.0 - weight) * getattr(mine, name) + weight * getattr(theirs, name)
+                for name in ARRAYS
+            }
+            duration = mix(mine.duration, theirs.duration)
+            phases.append(GaitPhase(mine.name, mine.feet, duration, **mixed))
+        speed, apex = mix(self.speed, other.speed), mix(self.apex, other.apex)
+        return Gait(self.robot, speed, apex, tuple(phases))
