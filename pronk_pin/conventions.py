@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ._state import as_array, as_q
 from ._typing import Array, IntArray
 from .errors import InvalidInput
 from .robot import JOINTS, Robot
@@ -148,26 +149,23 @@ def _paper_names(robot: Robot) -> tuple[str, ...]:
 
 
 def _rotate(rotation: Array, vector: Array) -> Array:
-    return np.einsum("...ij,...j->...i", rotation, vector)
+    return np.asarray(np.einsum("...ij,...j->...i", rotation, vector))
 
 
 def _checked(
     robot: Robot, q: Array, v: Array | None, a: Array | None, tau: Array | None
 ) -> tuple[Array, Array | None, Array | None, Array | None]:
-    """Arrays of the right sizes and one batch shape, with a unit quaternion."""
-    sizes = (robot.nq, robot.nv, robot.nv, robot.nu)
-    arrays = [None if x is None else np.asarray(x, dtype=float) for x in (q, v, a, tau)]
-    first = arrays[0]
-    assert first is not None
-    for array, size in zip(arrays, sizes, strict=True):
-        if array is not None and array.shape != (*first.shape[:-1], size):
-            raise InvalidInput(f"shape {array.shape} where (..., {size}) is expected")
+    """Arrays of the right sizes and one batch shape, with a unit quaternion.
+
+    Only the norm of the quaternion matters here, and both orders of its components share it.
+    """
+    q = as_q(robot, q)
+    batch = q.shape[:-1]
     if a is not None and v is None:
         raise InvalidInput("an acceleration changes frames only with its velocity; give both")
-    norm = np.linalg.norm(first[..., 3:7], axis=-1)
-    if not np.allclose(norm, 1.0, atol=1e-6):
-        raise InvalidInput(
-            f"the base quaternion has norm {np.ravel(norm)[0]:.6g}; normalise it first "
-            "(pinocchio.normalize)"
-        )
-    return first, arrays[1], arrays[2], arrays[3]
+    return (
+        q,
+        None if v is None else as_array("the velocity", v, robot.nv, batch),
+        None if a is None else as_array("the acceleration", a, robot.nv, batch),
+        None if tau is None else as_array("the torques", tau, robot.nu, batch),
+    )

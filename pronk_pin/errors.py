@@ -94,3 +94,21 @@ class SimulationDiverged(PronkError):
             f"the simulation diverged at step {step}; reduce the feedback gains or the "
             "time step of the scenario"
         )
+
+
+class PortUnavailable(PronkError):
+    """A port that the live page cannot have.
+
+    Attributes:
+        host: The address it was to listen on.
+        ports: The port or ports that were tried.
+        reason: What the system said.
+    """
+
+    def __init__(self, host: str, ports: range, reason: str) -> None:
+        self.host, self.ports, self.reason = host, ports, reason
+        tried = f"port {ports[0]}" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]}"
+        super().__init__(
+            f"{tried} of {host} cannot be used ({reason}); choose another with --port, "
+            "or leave it out to get a free one"
+        )

@@ -1,4 +1,4 @@
-"""Bezier polynomials over the phase: eq. (6) of the paper.
+"""Bezier polynomials over the phase: eq. (7) of the paper.
 
 Coefficients stand in the last axis: `(..., order + 1)`. The phase `s` runs from 0 to 1.
 """
@@ -40,7 +40,7 @@ def differentiate(coefficients: Array) -> Array:
     order = coefficients.shape[-1] - 1
     if order == 0:
         return np.zeros_like(coefficients)
-    return order * np.diff(coefficients, axis=-1)
+    return np.asarray(order * np.diff(coefficients, axis=-1))
 
 
 def fit(

@@ -48,7 +48,7 @@ class GaitPhase:
         name: "stance" or "flight".
         feet: Legs whose feet stand on the ground.
         duration: How long the phase lasts [s].
-        joints: Coefficients of the joint angles [rad], shape (12, order + 1): B of eq. (6).
+        joints: Coefficients of the joint angles [rad], shape (12, order + 1): B of eq. (7).
         base: Coefficients of the trunk's x [m], z [m] and pitch [rad], shape (3, order + 1);
             x is 0 where the stride begins.
         tau: Coefficients of the motor torques [N m], shape (12, order + 1).
@@ -146,7 +146,7 @@ class Gait:
         return sum(phase.duration for phase in self.phases)
 
     def blend(self, other: Gait, weight: float) -> Gait:
-        """Interpolate towards another gait: eq. (12), for coefficients and durations alike.
+        """Interpolate towards another gait: eq. (13), for coefficients and durations alike.
 
         Args:
             other: A gait of the same phases and orders.

@@ -1,7 +1,8 @@
-"""The gait library: gaits by speed, interpolated between (eq. 12), saved as one `.npz`."""
+"""The gait library: gaits by speed, interpolated between (eq. 13), saved as one `.npz`."""
 
 from __future__ import annotations
 
+import itertools
 import json
 import zipfile
 from collections.abc import Mapping
@@ -39,7 +40,7 @@ class GaitLibrary:
 
     def __post_init__(self) -> None:
         speeds = [gait.speed for gait in self.gaits]
-        if not speeds or any(b <= a for a, b in zip(speeds, speeds[1:], strict=False)):
+        if not speeds or any(b <= a for a, b in itertools.pairwise(speeds)):
             raise InvalidInput(f"a gait library needs gaits of increasing speed, not {speeds}")
 
     @property
@@ -53,7 +54,7 @@ class GaitLibrary:
         return np.array([gait.speed for gait in self.gaits])
 
     def at(self, speed: float) -> Gait:
-        """The gait at a speed [m/s], interpolated between the two closest ones: eq. (12).
+        """The gait at a speed [m/s], interpolated between the two closest ones: eq. (13).
 
         Raises:
             SpeedOutOfRange: The library does not cover the speed.

@@ -1,0 +1,113 @@
+"""Feet on the ground: Jacobians and bias accelerations of point and rolling contacts.
+
+A point contact holds the foot's centre c: c_dot = 0, eq. (3) of the paper. A rolling contact lets
+the foot, a sphere of radius r, roll on the ground without slipping: the lowest point of the sphere
+is at rest,
+
+    c_dot + w x d = 0,    c_ddot + dw/dt x d = 0,    d = (0, 0, -r),
+
+with the angular velocity w of the calf; the transposed Jacobian applies the contact force there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from ._state import as_one, as_q, as_state, known_name, leg_indices
+from ._typing import Array
+from .robot import Robot
+
+Contact = Literal["point", "rolling"]
+"""How a foot stands on the ground."""
+
+CONTACTS: tuple[Contact, ...] = ("point", "rolling")
+
+
+def contact_jacobian(
+    robot: Robot,
+    q: npt.ArrayLike,
+    *,
+    feet: Iterable[str] | None = None,
+    contact: Contact = "point",
+) -> Array:
+    """Contact Jacobian J of eq. (2), the paper's J^T: c_dot = J v in the world's axes.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (19,).
+        feet: Legs in contact, in the order of the rows; all if None.
+        contact: "point" or "rolling".
+
+    Returns:
+        Shape (3 len(feet), 18).
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+        UnknownName: There is no such leg or contact.
+    """
+    q = as_one("q", as_q(robot, q))
+    return jacobian_at(robot, q, leg_indices(robot, feet), contact_radius(robot, contact))
+
+
+def contact_bias(
+    robot: Robot,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    *,
+    feet: Iterable[str] | None = None,
+    contact: Contact = "point",
+) -> Array:
+    """Bias acceleration sigma of eq. (4): c_ddot = J a + sigma in the world's axes [m/s^2].
+
+    Arguments and errors are those of `contact_jacobian`, with the velocity v, shape (18,).
+
+    Returns:
+        Shape (3 len(feet),).
+    """
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
+    return bias_at(robot, q, v, leg_indices(robot, feet), contact_radius(robot, contact))
+
+
+def contact_radius(robot: Robot, contact: str) -> float:
+    """Distance from the foot's centre down to where the contact acts [m].
+
+    Raises:
+        UnknownName: There is no such contact.
+    """
+    known_name("contact", contact, CONTACTS)
+    return robot.foot_radius if contact == "rolling" else 0.0
+
+
+def jacobian_at(robot: Robot, q: Array, legs: Sequence[int], radius: float) -> Array:
+    """`contact_jacobian` of checked arguments, with the legs by index."""
+    model, data = robot.model, robot.data
+    pin.computeJointJacobians(model, data, q)
+    jacobian = np.empty((3 * len(legs), robot.nv))
+    for row, leg in enumerate(legs):
+        foot = pin.getFrameJacobian(model, data, robot.foot_ids[leg], pin.LOCAL_WORLD_ALIGNED)
+        jacobian[3 * row : 3 * row + 3] = foot[:3]
+        # w x (0, 0, -r) = (-r w_y, r w_x, 0)
+        jacobian[3 * row] -= radius * foot[4]
+        jacobian[3 * row + 1] += radius * foot[3]
+    return jacobian
+
+
+def bias_at(robot: Robot, q: Array, v: Array, legs: Sequence[int], radius: float) -> Array:
+    """`contact_bias` of checked arguments, with the legs by index."""
+    model, data = robot.model, robot.data
+    pin.forwardKinematics(model, data, q, v, np.zeros(robot.nv))
+    bias = np.empty(3 * len(legs))
+    for row, leg in enumerate(legs):
+        foot = robot.foot_ids[leg]
+        classical = pin.getFrameClassicalAcceleration(model, data, foot, pin.LOCAL_WORLD_ALIGNED)
+        bias[3 * row : 3 * row + 3] = classical.linear
+        angular = classical.angular
+        bias[3 * row] -= radius * angular[1]
+        bias[3 * row + 1] += radius * angular[0]
+    return bias

@@ -1,0 +1,105 @@
+"""The one place where states, feet and options that a user passes in are checked.
+
+Leading dimensions are a batch: `(..., 19)` is one configuration or any batch of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ._typing import Array
+from .errors import InvalidInput, UnknownName
+from .robot import Robot
+
+_UNIT_TOLERANCE = 1e-6
+"""How far the norm of a base quaternion may be from 1."""
+
+
+def as_array(name: str, value: npt.ArrayLike, size: int, batch: tuple[int, ...] | None) -> Array:
+    """A finite float64 array of shape (*batch, size); a batch of None allows any.
+
+    Raises:
+        InvalidInput: Not numbers, not finite, or of another shape.
+    """
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InvalidInput(f"{name} is not an array of numbers ({error}); pass floats") from error
+    leading = "..." if batch is None else ", ".join(map(str, batch))
+    if array.shape[-1:] != (size,) or (batch is not None and array.shape[:-1] != batch):
+        expected = f"({leading}, {size})" if leading else f"({size},)"
+        raise InvalidInput(
+            f"{name} has shape {array.shape} where {expected} is expected; the batch comes "
+            "first and is the same for every argument"
+        )
+    if not np.isfinite(array).all():
+        raise InvalidInput(f"{name} holds NaN or infinite values; remove them first")
+    return array
+
+
+def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
+    """A configuration (..., nq) with a unit base quaternion.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    """
+    array = as_array("q", q, robot.nq, None)
+    norms = np.ravel(np.linalg.norm(array[..., 3:7], axis=-1))
+    wrong = norms[np.abs(norms - 1.0) > _UNIT_TOLERANCE]
+    if wrong.size:
+        raise InvalidInput(
+            f"the base quaternion has norm {wrong[0]:.6g}; normalise it first (pinocchio.normalize)"
+        )
+    return array
+
+
+def as_state(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, Array]:
+    """A configuration (..., nq) and a velocity (..., nv) of the same batch shape.
+
+    Raises:
+        InvalidInput: As `as_q`, or v does not fit q.
+    """
+    configuration = as_q(robot, q)
+    return configuration, as_array("v", v, robot.nv, configuration.shape[:-1])
+
+
+def as_one(name: str, array: Array) -> Array:
+    """The array itself, if it is no batch.
+
+    Raises:
+        InvalidInput: It has leading dimensions.
+    """
+    if array.ndim != 1:
+        raise InvalidInput(f"{name} has shape {array.shape}, a batch; pass one state at a time")
+    return array
+
+
+def leg_indices(robot: Robot, feet: Iterable[str] | None) -> list[int]:
+    """Indices of legs given by name, in the order given; None means all legs.
+
+    Raises:
+        UnknownName: The robot has no such leg.
+        InvalidInput: A leg is named twice, which would make its contact singular.
+    """
+    if feet is None:
+        return list(range(len(robot.legs)))
+    names = [feet] if isinstance(feet, str) else list(feet)
+    for name in names:
+        known_name("leg", name, robot.legs)
+    if len(set(names)) != len(names):
+        raise InvalidInput(f"feet={names} names a leg twice; name each leg once")
+    return [robot.legs.index(name) for name in names]
+
+
+def known_name(kind: str, name: str, known: Sequence[str]) -> str:
+    """The name itself, if it is known.
+
+    Raises:
+        UnknownName: It is not.
+    """
+    if name not in known:
+        raise UnknownName(kind, name, known)
+    return name

@@ -1,0 +1,86 @@
+"""The strides of a simulation as a labelled dataset: names, dimensions, units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from ..control import phase_grid
+from ..gait import Gait
+from ..robot import Robot
+from .record import SAMPLES, StrideLog
+
+_UNITS = {
+    "count": ("1", "finished strides"),
+    "start": ("s", "time of touchdown, from the first one on"),
+    "duration": ("s", "from touchdown to touchdown"),
+    "stance": ("s", "duration of stance"),
+    "mean_speed": ("m/s", "mean forward speed of the trunk over the stride"),
+    "apex": ("m", "greatest height of the trunk in flight"),
+    "upright": ("1", "1 as long as the robot has not fallen"),
+    "learning": ("1", "1 where the stride was played with the learning law on"),
+    "peak_error": ("rad", "peak of the stance error against the unmodified reference"),
+    "rms_error": ("rad", "root mean square of the stance error"),
+    "error": ("rad", "reference minus measured joint angle in stance"),
+    "feedback": ("N m", "torque of the feedback in stance"),
+    "feedforward": ("N m", "torque of the feedforward in stance"),
+    "flight": ("rad", "measured joint angle in flight"),
+    "base_stance": ("m", "trunk position in stance"),
+    "base_flight": ("m", "trunk position in flight"),
+    "reference": ("rad", "reference joint angle in stance"),
+    "planned_apex": ("m", "apex of the gait"),
+    "planned_duration": ("s", "duration of the gait's stride"),
+}
+
+
+def to_dataset(
+    log: StrideLog, robot: Robot, gaits: Sequence[Gait], *, attributes: Mapping[str, str | int]
+) -> xr.Dataset:
+    """Label the strides of a simulation.
+
+    Dimensions: `speed`, `stride` (from 0), `phase` (0 to 1 within stance or flight), `joint`
+    (by name, in Pinocchio's order), `axis` (x, z). Unfinished strides are cut off.
+    """
+    last = int(log.count.max(initial=0))
+    per_stride, per_joint = ("speed", "stride"), ("speed", "stride", "joint")
+    curve = ("speed", "stride", "phase", "joint")
+    variables: dict[str, tuple[tuple[str, ...], npt.NDArray[np.floating[Any]]]] = {
+        ("mean_speed" if name == "speed" else name): (per_stride, values[:, :last])
+        for name, values in log.scalars.items()
+    }
+    variables["peak_error"] = (per_joint, log.peak_error[:, :last])
+    variables["rms_error"] = (per_joint, log.rms_error[:, :last])
+    for name, values in log.curves.items():
+        variables[name] = (curve, values[:, :last])
+    for name, values in log.base.items():
+        variables[f"base_{name}"] = (("speed", "stride", "phase", "axis"), values[:, :last])
+    grid = phase_grid(SAMPLES)
+    reference = np.stack([gait.stance.joint_reference(grid)[0] for gait in gaits])
+    dataset = xr.Dataset(
+        {
+            "count": ("speed", log.count),
+            "planned_apex": ("speed", [gait.apex for gait in gaits]),
+            "planned_duration": ("speed", [gait.duration for gait in gaits]),
+            "reference": (("speed", "phase", "joint"), reference),
+            **variables,
+        },
+        coords={
+            "speed": ("speed", [gait.speed for gait in gaits], {"units": "m/s"}),
+            "stride": np.arange(last),
+            "phase": ("phase", grid, {"units": "1"}),
+            "joint": [name.removesuffix("_joint") for name in robot.joint_names],
+            "axis": ["x", "z"],
+        },
+        attrs=dict(attributes),
+    )
+    finished = dataset["stride"] < dataset["count"]
+    for name in map(str, dataset.data_vars):
+        unit, text = _UNITS[name]
+        if "stride" in dataset[name].dims:
+            dataset[name] = dataset[name].where(finished)
+        dataset[name].attrs.update(units=unit, long_name=text)
+    return dataset

@@ -1,0 +1,212 @@
+"""The controller: a tape at every event, learning at every touchdown.
+
+Control of n robots that pronk at their own speeds. The state machine and the clock belong to
+whoever plays the tapes; the controller is called at the events and answers with the next tape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .._typing import Array, IntArray
+from ..errors import InvalidInput, UnknownName
+from ..gait import Gait
+from ..kinematics import rotate_leg
+from ..robot import NL, Robot
+from .estimation import SpeedEstimator
+from .learning import LearningLaw, PaperILC, PDTypeILC, StrideSelection
+from .record import SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
+from .regulation import LegAngleRegulator
+from .tape import Gains, Tape
+
+LATEST_TOUCHDOWN = 2.0
+"""Flight ends without a touchdown after this many times its planned duration."""
+
+
+@dataclass(frozen=True)
+class ControllerSpec:
+    """A controller of the comparison: where its feedforward comes from, and whether it learns.
+
+    Attributes:
+        name: Short name, as on the command line.
+        seed: Feedforward it begins with: "none", "model" or "library".
+        law: Learning law that is switched on later, if any.
+        gains: Feedback gains: eq. (9).
+        regulator: Speed regulation: eq. (12).
+        selection: Strides worth learning from.
+        speed_filter: Time constant of the speed estimate's filter [s].
+        touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
+            contact sensor is one late, and the contact began between two.
+    """
+
+    name: str
+    seed: str = "none"
+    law: LearningLaw | None = None
+    gains: Gains = field(default_factory=Gains)
+    regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
+    selection: StrideSelection = field(default_factory=StrideSelection)
+    speed_filter: float = 0.02
+    touchdown_ticks: int = 2
+
+    def __post_init__(self) -> None:
+        if self.seed not in ("none", "model", "library"):
+            raise UnknownName("feedforward seed", self.seed, ("none", "model", "library"))
+
+
+CONTROLLERS = {
+    spec.name: spec
+    for spec in (
+        ControllerSpec("pd"),
+        ControllerSpec("ilc", law=PDTypeILC()),
+        ControllerSpec("model", seed="model"),
+        ControllerSpec("library", seed="library"),
+        ControllerSpec("model+ilc", seed="model", law=PDTypeILC()),
+        ControllerSpec("ilc-paper", law=PaperILC()),
+    )
+}
+"""Controllers known by name; the first five make the default comparison."""
+
+
+def load_controller(name: str) -> ControllerSpec:
+    """The controller of that name.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    if name not in CONTROLLERS:
+        raise UnknownName("controller", name, CONTROLLERS)
+    return CONTROLLERS[name]
+
+
+class Controller:
+    """Runs one `ControllerSpec` on n robots, each with its own gait.
+
+    Attributes:
+        feedforward: The feedforward in use, on the phase grid of stance [N m], shape
+            (n, samples, 12).
+        learning: Whether the law is switched on.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gaits: Sequence[Gait],
+        spec: ControllerSpec,
+        *,
+        timestep: float,
+        feedforward: Array | None = None,
+    ) -> None:
+        n = len(gaits)
+        if feedforward is None:
+            feedforward = np.zeros((n, SAMPLES, NL))
+        if feedforward.shape != (n, SAMPLES, NL):
+            raise InvalidInput(
+                f"a feedforward of shape {feedforward.shape}; expected {(n, SAMPLES, NL)}: "
+                "torques on the phase grid of stance for each gait"
+            )
+        self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
+        self.feedforward = feedforward.copy()
+        self.learning = False
+        self._timestep = timestep
+        # Error, its rate, feedback and feedforward of each robot's last stance.
+        self._last = np.zeros((4, n, SAMPLES, NL))
+        self._practised = np.zeros(n, dtype=bool)
+        self._estimator = SpeedEstimator(
+            robot, n, time_constant=spec.speed_filter, timestep=timestep
+        )
+        self._tabulate()
+
+    def _tabulate(self) -> None:
+        """References at the ticks, for all robots at once: shapes (n, ticks, 12)."""
+        dt, gaits = self._timestep, self.gaits
+        self._stance_time = np.array([gait.stance.duration for gait in gaits])
+        self._flight_time = np.array([gait.flight.duration for gait in gaits])
+        self.stance_ticks = np.round(self._stance_time / dt).astype(np.intp)
+        self.flight_ticks = np.ceil(LATEST_TOUCHDOWN * self._flight_time / dt).astype(np.intp)
+        self._phase = _phases(self._stance_time, int(self.stance_ticks.max()), dt)
+        stance = [g.stance.joint_reference(s) for g, s in zip(gaits, self._phase, strict=True)]
+        self._stance = np.stack([reference for reference, _ in stance])
+        self._stance_rate = np.stack([rate for _, rate in stance])
+
+        phase = _phases(self._flight_time, int(self.flight_ticks.max()), dt)
+        flight = [g.flight.joint_reference(s) for g, s in zip(gaits, phase, strict=True)]
+        self._flight = np.stack([reference for reference, _ in flight])
+        # Past its planned end the flight holds the posture of touchdown.
+        moving = (phase < 1.0)[..., None]
+        self._flight_rate = np.where(moving, np.stack([rate for _, rate in flight]), 0.0)
+        share = [self.spec.regulator.profile(s) for s in phase]
+        self._turn = np.stack([value for value, _ in share])
+        self._turn_rate = np.stack([rate for _, rate in share]) / self._flight_time[:, None]
+        self._lift_off_speed = np.array(
+            [gait.stance.base_reference(np.array([1.0]))[1][0, 0] for gait in gaits]
+        )
+
+    @property
+    def max_ticks(self) -> int:
+        """Length of the longest tape."""
+        return int(max(self.stance_ticks.max(), self.flight_ticks.max()))
+
+    def stand(self, ticks: int) -> Tape:
+        """The start-up: every robot holds the posture in which its stance begins."""
+        n = len(self.gaits)
+        shape = (n, min(ticks, self.max_ticks), NL)
+        position = np.broadcast_to(self._stance[:, :1], shape)
+        return Tape(np.zeros(shape), position, np.zeros(shape), np.full(n, shape[1]))
+
+    def touchdown(self, rows: IntArray, duration: Array) -> Tape:
+        """Stance tapes for robots that have just touched down; learns from their last stride.
+
+        Args:
+            rows: Which robots.
+            duration: How long their strides lasted [s], shape (len(rows),).
+        """
+        if self.learning and self.spec.law is not None:
+            self._learn(self.spec.law, rows, duration)
+        return Tape(
+            feedforward=resample(self.feedforward[rows], self._phase[rows] * (SAMPLES - 1)),
+            position=self._stance[rows],
+            velocity=self._stance_rate[rows],
+            length=self.stance_ticks[rows],
+            begin=self.spec.touchdown_ticks,
+        )
+
+    def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
+        """Flight tapes for robots that have just finished a stance, and the stance's record."""
+        record = self._record(rows, log)
+        self._last[:, rows] = record.error, record.error_rate, record.feedback, record.feedforward
+        self._practised[rows] = True
+        speed = self._estimator.update(rows, log)
+        turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
+        share, rate = self._turn[rows] * turn, self._turn_rate[rows] * turn  # (m, ticks)
+        position = rotate_leg(self.robot, self._flight[rows], share[..., None])
+        velocity = self._flight_rate[rows].copy()
+        velocity[..., 1::3] += rate[..., None]
+        tape = Tape(np.zeros_like(position), position, velocity, self.flight_ticks[rows])
+        return tape, record
+
+    def _record(self, rows: IntArray, log: PhaseLog) -> StrideRecord:
+        """The stance on the phase grid, aligned on t / T of the reference."""
+        ticks = self._stance_time[rows] / self._timestep
+        index = log.index(phase_grid(), ticks)
+        stance = slice(self._stance.shape[1])
+        error = resample(self._stance[rows] - log.joints[:, stance], index)
+        rate = resample(self._stance_rate[rows] - log.joint_rates[:, stance], index)
+        feedback, feedforward = resample(log.feedback, index), self.feedforward[rows]
+        return StrideRecord(error, rate, feedback, feedforward, np.ones(len(rows)))
+
+    def _learn(self, law: LearningLaw, rows: IntArray, duration: Array) -> None:
+        """Update the feedforward of those robots whose last stride is worth learning from."""
+        planned = self._stance_time[rows] + self._flight_time[rows]
+        error, rate, feedback, feedforward = self._last[:, rows]
+        record = StrideRecord(error, rate, feedback, feedforward, duration / planned)
+        usable = self.spec.selection.usable(record) & self._practised[rows]
+        if usable.any():
+            self.feedforward[rows[usable]] = law.update(record)[usable]
+
+
+def _phases(durations: Array, ticks: int, timestep: float) -> Array:
+    """Phase s at each tick, held at 1, shape (n, ticks)."""
+    return np.minimum(np.arange(ticks) * timestep / durations[:, None], 1.0)

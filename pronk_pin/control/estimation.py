@@ -1,0 +1,48 @@
+"""What the controller believes about its speed: leg odometry and a first-order filter.
+
+In stance the feet do not slip, so the joint encoders tell the trunk's speed; in flight it stays as
+it was at lift-off. Section II.E of the paper.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .._typing import Array, IntArray
+from ..errors import InvalidInput
+from ..kinematics import leg_odometry
+from ..robot import Robot
+from .filters import first_order
+from .record import PhaseLog
+
+
+class SpeedEstimator:
+    """Forward speed of n robots, one estimate a stride.
+
+    Attributes:
+        speed: The estimates [m/s], shape (n,).
+    """
+
+    def __init__(self, robot: Robot, n: int, *, time_constant: float, timestep: float) -> None:
+        if time_constant < 0.0:
+            raise InvalidInput("the time constant of the speed filter must not be negative")
+        self._robot, self._time_constant, self._timestep = robot, time_constant, timestep
+        self.speed = np.zeros(n)
+
+    def update(self, rows: IntArray, log: PhaseLog) -> Array:
+        """Take in a stance that some robots have just finished; their new estimates [m/s]."""
+        n, ticks = log.joints.shape[:2]
+        # The base is level: locked here, and an attitude estimate's business elsewhere.
+        q = self._robot.q_from_base(np.zeros((n, ticks, 3)), log.joints)
+        v = np.concatenate([np.zeros((n, ticks, 6)), log.joint_rates], axis=-1)
+        velocity = leg_odometry(
+            self._robot, q.reshape(n * ticks, -1), v.reshape(n * ticks, -1), contact="rolling"
+        )
+        filtered = first_order(
+            velocity[:, 0].reshape(n, ticks),
+            self.speed[rows],
+            time_constant=self._time_constant,
+            timestep=self._timestep,
+        )
+        self.speed[rows] = filtered[np.arange(n), log.length - 1]
+        return self.speed[rows]

@@ -1,0 +1,110 @@
+"""Learning laws: from the record of a stride to the feedforward of the next.
+
+A law is a function with parameters and no state: what was learned so far is in the record.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from .._typing import Array, BoolArray
+from ..errors import InvalidInput
+from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, look_ahead
+from .record import StrideRecord
+from .tape import Gains
+
+
+class LearningLaw(Protocol):
+    """Anything that turns a stride into the next feedforward."""
+
+    def update(self, record: StrideRecord) -> Array:
+        """The next stride's feedforward on the phase grid [N m], shape (n, samples, 12)."""
+        ...
+
+
+@dataclass(frozen=True)
+class StrideSelection:
+    """Which strides are worth learning from: those of about the right length.
+
+    Attributes:
+        shortest: Shortest stride, over the reference's duration.
+        longest: Longest one.
+    """
+
+    shortest: float = 0.7
+    longest: float = 1.4
+
+    def usable(self, record: StrideRecord) -> BoolArray:
+        """Which robots' strides are, shape (n,)."""
+        finite = np.isfinite(record.error).all(axis=(1, 2))
+        within = (record.duration >= self.shortest) & (record.duration <= self.longest)
+        return np.asarray(finite & within)
+
+
+@dataclass(frozen=True)
+class PDTypeILC:
+    """PD-type law on a memory that holds the feedforward only, with forgetting.
+
+    `ff <- Q[(1 - leak) ff + gain (Kp e + Kd e')(s + delta)]`
+
+    Unlike the paper's law its memory holds no feedback torque, so that its learning gain is `gain`
+    and not `1 + gain`.
+
+    Attributes:
+        gain: Learning gain; 0 to 1.
+        leak: Part of the memory that is forgotten in each stride.
+        delta: Look-ahead in phase.
+        gains: Weights of the error and its rate: eq. (10).
+        filter: The learning filter Q.
+    """
+
+    gain: float = 0.5
+    leak: float = 0.005
+    delta: float = 0.06
+    gains: Gains = field(default_factory=Gains)
+    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.04))
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.gain < 2.0 and 0.0 <= self.leak <= 1.0 and 0.0 <= self.delta < 1.0):
+            raise InvalidInput(
+                "a PD-type law needs gain in [0, 2), leak in [0, 1] and delta in [0, 1); "
+                f"got {self.gain:g}, {self.leak:g}, {self.delta:g}"
+            )
+
+    def update(self, record: StrideRecord) -> Array:
+        """See `LearningLaw.update`."""
+        correction = _weighted_error(record, self.gains, self.delta)
+        return self.filter((1.0 - self.leak) * record.feedforward + self.gain * correction)
+
+
+@dataclass(frozen=True)
+class PaperILC:
+    """The paper's law: eq. (10), on the recorded total torque, with the printed filter.
+
+    The recorded torque already holds the feedback of the last stride, so the total learning gain
+    is 2; only the filter's leak keeps the law from diverging.
+
+    Attributes:
+        delta: Look-ahead in phase.
+        gains: Feedforward gains, in the paper equal to the feedback gains.
+        filter: Zero-phase filter over recorded torques and errors.
+    """
+
+    delta: float = 0.06
+    gains: Gains = field(default_factory=Gains)
+    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter(PAPER_B, PAPER_A))
+
+    def update(self, record: StrideRecord) -> Array:
+        """See `LearningLaw.update`."""
+        torque = record.feedforward + record.feedback
+        return self.filter(torque + _weighted_error(record, self.gains, self.delta))
+
+
+def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:
+    """Kp e(s + delta) + Kd e'(s + delta) [N m], shape (n, samples, 12)."""
+    error = look_ahead(record.error, delta)
+    rate = look_ahead(record.error_rate, delta)
+    return gains.proportional * error + gains.derivative * rate

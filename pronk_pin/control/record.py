@@ -1,0 +1,87 @@
+"""What a stride was like: the record from which a controller learns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import Array, IntArray
+
+SAMPLES = 161
+"""Samples of the phase grid s = 0 ... 1 on which strides are recorded and learned."""
+
+
+@dataclass(frozen=True)
+class PhaseLog:
+    """What n robots measured and commanded over one phase, tick by tick.
+
+    Attributes:
+        joints: Joint angles [rad], shape (n, ticks, 12).
+        joint_rates: Joint velocities [rad/s], shape (n, ticks, 12).
+        feedback: Torque of the feedback [N m], shape (n, ticks, 12).
+        feedforward: Torque of the feedforward [N m], shape (n, ticks, 12).
+        begin: First tick that was measured, shape (n,).
+        length: Tick at which the phase ended; later ones hold nothing of it, shape (n,).
+    """
+
+    joints: Array
+    joint_rates: Array
+    feedback: Array
+    feedforward: Array
+    begin: IntArray
+    length: IntArray
+
+    def index(self, s: Array, ticks: Array | None = None) -> Array:
+        """Fractional ticks at which phases s (m,) were measured, shape (n, m).
+
+        Args:
+            s: Phases.
+            ticks: Ticks that s = 1 stands for, shape (n,); by default the last measured one. Phases
+                outside the measured ticks are held at the first or the last of them.
+        """
+        last = self.length[:, None] - 1.0
+        index = s * (last if ticks is None else ticks[:, None])
+        return np.asarray(np.clip(index, self.begin[:, None], last))
+
+
+@dataclass(frozen=True)
+class StrideRecord:
+    """The stance of n robots on the phase grid; all arrays have the shape (n, samples, 12).
+
+    Attributes:
+        error: Unmodified reference minus measured joint angle [rad]: eq. (8).
+        error_rate: Its time derivative [rad/s].
+        feedback: Torque of the feedback, eq. (9) [N m].
+        feedforward: Torque of the feedforward [N m].
+        duration: Duration of the whole stride over that of the reference, shape (n,).
+    """
+
+    error: Array
+    error_rate: Array
+    feedback: Array
+    feedforward: Array
+    duration: Array
+
+
+def phase_grid(samples: int = SAMPLES) -> Array:
+    """Phases of the grid, shape (samples,)."""
+    return np.linspace(0.0, 1.0, samples)
+
+
+def resample(values: Array, position: Array) -> Array:
+    """Linear interpolation along axis 1 at fractional indices.
+
+    Args:
+        values: Samples, shape (n, m, ...).
+        position: Fractional indices into axis 1, shape (n, k); held at the ends.
+
+    Returns:
+        Shape (n, k, ...).
+    """
+    position = np.clip(position, 0.0, values.shape[1] - 1.0)
+    lower = np.minimum(position.astype(np.intp), max(values.shape[1] - 2, 0))
+    upper = np.minimum(lower + 1, values.shape[1] - 1)
+    weight = (position - lower).reshape(*position.shape, *[1] * (values.ndim - 2))
+    rows = np.arange(len(values))[:, None]
+    return np.asarray((1.0 - weight) * values[rows, lower] + weight * values[rows, upper])

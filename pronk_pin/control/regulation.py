@@ -1,0 +1,41 @@
+"""Speed regulation: where the legs are put down, eq. (12)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import Array
+from ..errors import InvalidInput
+
+
+@dataclass(frozen=True)
+class LegAngleRegulator:
+    """Turns the legs in flight in proportion to the speed error: eq. (12).
+
+    The leg angle theta = q_thigh + q_calf / 2 grows backwards, so a robot that is too fast needs a
+    smaller one: the gain is negative.
+
+    Attributes:
+        gain: K_theta [rad s/m].
+        limit: Largest change of the leg angle [rad].
+        settled: Phase of flight at which the legs have reached the new angle.
+    """
+
+    gain: float = -0.1
+    limit: float = 0.15
+    settled: float = 0.7
+
+    def __post_init__(self) -> None:
+        if self.limit < 0.0 or not 0.0 < self.settled <= 1.0:
+            raise InvalidInput("leg-angle regulation needs limit >= 0 and settled in (0, 1]")
+
+    def turn(self, speed_error: Array) -> Array:
+        """Change of the leg angle [rad] for speed minus desired speed [m/s], shape (n,)."""
+        return np.clip(self.gain * speed_error, -self.limit, self.limit)
+
+    def profile(self, s: Array) -> tuple[Array, Array]:
+        """Share of the change that is reached at the phase s, and its derivative by s."""
+        x = np.clip(s / self.settled, 0.0, 1.0)
+        return x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / self.settled

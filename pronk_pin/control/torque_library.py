@@ -1,0 +1,53 @@
+"""The torque library: learned feedforward by speed, the "muscle memory" of section III.B."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import Array
+from ..errors import InvalidInput, SpeedOutOfRange
+
+
+@dataclass(frozen=True)
+class TorqueLibrary:
+    """Stance torques by speed, averaged over strides in steady state.
+
+    Attributes:
+        speeds: Increasing speeds [m/s], shape (n,).
+        torque: Mean feedforward on the phase grid [N m], shape (n, samples, 12).
+        spread: Its standard deviation over the strides [N m], shape (n, samples, 12).
+    """
+
+    speeds: Array
+    torque: Array
+    spread: Array
+
+    def __post_init__(self) -> None:
+        if self.torque.shape != self.spread.shape or len(self.torque) != len(self.speeds):
+            raise InvalidInput("a torque library needs one torque and one spread for each speed")
+        if np.any(np.diff(self.speeds) <= 0.0):
+            raise InvalidInput("the speeds of a torque library must increase")
+
+    @classmethod
+    def from_strides(cls, speeds: Array, torque: Array) -> TorqueLibrary:
+        """Average over strides: `torque` has the shape (n, strides, samples, 12)."""
+        return cls(speeds, np.nanmean(torque, axis=1), np.nanstd(torque, axis=1))
+
+    def at(self, speeds: Array) -> Array:
+        """Torques at given speeds (m,), interpolated between neighbours [N m], (m, samples, 12).
+
+        Raises:
+            SpeedOutOfRange: The library does not cover a speed.
+        """
+        out = []
+        for speed in np.atleast_1d(speeds):
+            if not self.speeds[0] - 1e-9 <= speed <= self.speeds[-1] + 1e-9:
+                raise SpeedOutOfRange(speed, float(self.speeds[0]), float(self.speeds[-1]))
+            position = np.interp(speed, self.speeds, np.arange(len(self.speeds)))
+            lower = int(position)
+            upper = min(lower + 1, len(self.speeds) - 1)
+            weight = position - lower
+            out.append((1.0 - weight) * self.torque[lower] + weight * self.torque[upper])
+        return np.stack(out)

@@ -1,0 +1,163 @@
+"""The robot folded on its mirror plane: the model that the gait optimisation differentiates.
+
+A pronking robot is its own mirror image, so the left legs say everything. The folded model keeps
+the trunk and the left legs, and counts each left leg twice where it acts on the trunk. With the
+trunk held to the sagittal plane without rotation its coordinates are
+
+    ``q = [x, z, front hip, thigh, calf, rear hip, thigh, calf]``  [m, m, rad, ...]  (8)
+
+and its equations are the x, z and left-leg rows of the whole robot's: no quaternion, no redundant
+right side. The trunk's centre of mass is taken to lie in the mirror plane; what it lies beside it
+gives a roll moment, which the guide of the locked trunk takes.
+
+Everything is a CasADi SX expression, so that the solver gets exact derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+
+from .._typing import Array, BoolArray, IntArray
+from ..errors import InvalidInput
+from ..robot import JOINTS, Robot
+from .newton_euler import NB, FrameMotion, newton_euler
+
+Contact = Literal["rolling", "point"]
+"""How a foot stands: a sphere that rolls without slip, or a point at the sphere's centre."""
+
+_MIRROR = {"L": "R", "R": "L"}
+
+
+@dataclass(frozen=True, eq=False)
+class FoldedModel:
+    """Dynamics and contact kinematics of the folded robot, as CasADi functions.
+
+    Forces are those of one motor and of one foot, not of a pair.
+
+    Attributes:
+        robot: The robot it was folded from.
+        contact: The contact model.
+        legs: The legs that are kept, front to rear.
+        lever: From a foot's centre to where the ground acts, in the world [m], shape (3,).
+        dynamics: ``(q, v, a, lam) -> forces`` (8): what must act along each coordinate besides
+            the contact forces `lam` (6) [N]: zero along x and z, the motor torques along the
+            joints. Eq. (2) of the paper.
+        impact: ``(q, dv, impulse) -> residual`` (8): zero where the contact impulses [N s] cause
+            the jump `dv` of the velocity, with no impulse from the motors.
+        feet: ``(q, v, a) -> (position, velocity, acceleration)``, each (3, 2): the position is
+            that of the spheres' centres [m]; velocity and acceleration are those that vanish in
+            contact. Eq. (3) of the paper.
+    """
+
+    robot: Robot
+    contact: Contact
+    legs: tuple[str, ...]
+    lever: Array
+    dynamics: ca.Function
+    impact: ca.Function
+    feet: ca.Function
+
+    @property
+    def nl(self) -> int:
+        """Motors of the folded robot."""
+        return len(self.legs) * len(JOINTS)
+
+    @property
+    def nq(self) -> int:
+        """Coordinates of the folded robot."""
+        return NB + self.nl
+
+    def joint_rows(self) -> IntArray:
+        """Which of the robot's joints the folded robot keeps, shape (6,)."""
+        kept = np.array([self.robot.legs.index(leg) for leg in self.legs], dtype=np.intp)
+        return _leg_joints(kept)
+
+    def leg_index(self) -> IntArray:
+        """For each leg of the robot, which leg of the folded robot moves it, shape (4,)."""
+        kept = {leg: i for i, leg in enumerate(self.legs)}
+        kept.update({mirrored(leg): i for i, leg in enumerate(self.legs)})
+        return np.array([kept[leg] for leg in self.robot.legs], dtype=np.intp)
+
+    def joint_index(self) -> IntArray:
+        """For each joint of the robot, which joint of the folded robot moves it, shape (12,)."""
+        return _leg_joints(self.leg_index())
+
+    def joint_sign(self) -> Array:
+        """-1 for the joints that the mirror reverses (the right hips), else 1, shape (12,)."""
+        reversed_ = np.array([joint == "hip" for joint in JOINTS])
+        return np.where(self._right()[:, None] & reversed_, -1.0, 1.0).ravel()
+
+    def force_sign(self) -> Array:
+        """-1 where the mirror reverses a contact force (right feet, y), else 1, shape (4, 3)."""
+        return np.where(self._right()[:, None] & np.array([False, True, False]), -1.0, 1.0)
+
+    def unfold_joints(self, folded: Array) -> Array:
+        """Joint quantities of the whole robot (..., 12) from those of the kept legs (..., 6)."""
+        return np.asarray(folded[..., self.joint_index()] * self.joint_sign())
+
+    def unfold_forces(self, folded: Array) -> Array:
+        """Contact forces of the whole robot (..., 4, 3) from those of the kept feet (..., 6)."""
+        by_leg = folded.reshape(*folded.shape[:-1], len(self.legs), 3)
+        return np.asarray(by_leg[..., self.leg_index(), :] * self.force_sign())
+
+    def _right(self) -> BoolArray:
+        return np.array([leg not in self.legs for leg in self.robot.legs])
+
+
+def _leg_joints(legs: IntArray) -> IntArray:
+    """Indices of the joints of legs given by index."""
+    return np.asarray(legs[:, None] * len(JOINTS) + np.arange(len(JOINTS))).ravel()
+
+
+def mirrored(leg: str) -> str:
+    """The leg on the other side: FL and FR, RL and RR."""
+    return leg[:-1] + _MIRROR[leg[-1]]
+
+
+@lru_cache(maxsize=8)
+def fold(robot: Robot, contact: Contact = "rolling") -> FoldedModel:
+    """Fold a robot on its mirror plane.
+
+    Raises:
+        InvalidInput: The legs do not come in pairs named ..L and ..R.
+    """
+    legs = tuple(leg for leg in robot.legs if leg.endswith("L"))
+    if sorted([*legs, *map(mirrored, legs)]) != sorted(robot.legs):
+        raise InvalidInput(
+            f"the legs {', '.join(robot.legs)} do not pair left and right; "
+            "name them ..L and ..R in the RobotSpec"
+        )
+    nq = NB + len(legs) * len(JOINTS)
+    q, v, a = (ca.SX.sym(name, nq) for name in "qva")
+    lam = ca.SX.sym("lam", 3, len(legs))
+    lever = np.array([0.0, 0.0, -robot.foot_radius if contact == "rolling" else 0.0])
+    gravity, at_rest = np.array(robot.model.gravity.linear), ca.SX.zeros(nq)
+    forces, feet = newton_euler(robot, legs, (q, v, a), lam, gravity, lever)
+    # Over an instant only M dv and the impulses count: no gravity, no velocity products.
+    jump, _ = newton_euler(robot, legs, (q, at_rest, a), lam, np.zeros(3), lever)
+    return FoldedModel(
+        robot=robot,
+        contact=contact,
+        legs=legs,
+        lever=lever,
+        dynamics=ca.Function("dynamics", [q, v, a, ca.vec(lam)], [forces]),
+        impact=ca.Function("impact", [q, a, ca.vec(lam)], [jump]),
+        feet=ca.Function("feet", [q, v, a], _contact_motion(feet, lever)),
+    )
+
+
+def _contact_motion(feet: list[FrameMotion], lever: Array) -> list[ca.SX]:
+    """Position, contact velocity and contact acceleration of the feet, each (3, feet).
+
+    The velocity is that of the material point at the lowest point of the sphere. Its derivative
+    has no centripetal term: the lever to the lowest point does not turn with the foot.
+    """
+    position = [foot.position for foot in feet]
+    velocity = [foot.velocity + ca.cross(foot.omega, lever) for foot in feet]
+    acceleration = [foot.acceleration + ca.cross(foot.alpha, lever) for foot in feet]
+    return [ca.horzcat(*position), ca.horzcat(*velocity), ca.horzcat(*acceleration)]

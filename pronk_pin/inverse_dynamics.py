@@ -1,0 +1,292 @@
+"""Motor torques and contact forces for a given motion: eq. (2) solved for tau and lambda.
+
+Four feet on the ground leave the forces undetermined: the feet can push against each other without
+moving the robot. What decides these internal forces is the cost, |tau|^2 as in eq. (6): of all
+forces that give the motion, those with the smallest motor torques. The guide's forces cost nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from ._contacts import Contact, contact_radius, jacobian_at
+from ._force_qp import FORCE_WEIGHT, ForceProblem, ForceQP, cone_sides
+from ._state import as_array, as_state, known_name, leg_indices
+from ._typing import Array, BoolArray
+from .conventions import rotation_matrix
+from .errors import InvalidInput
+from .robot import NB, Robot
+
+if TYPE_CHECKING:
+    from .gait import Gait
+
+GUIDE_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+"""Base coordinates that a guide can hold."""
+
+SAGITTAL_GUIDE = ("y", "roll", "pitch", "yaw")
+"""The guide of section III of the paper: the sagittal plane without rotation."""
+
+_TOLERANCE = 1e-6
+"""Violation up to which a solution counts as feasible [N, N m]."""
+_RANK = 1e-9
+"""Relative size below which a singular value counts as zero."""
+
+
+class InverseDynamics(NamedTuple):
+    """Torques and forces that produce a motion."""
+
+    tau: Array
+    """Motor torques [N m], shape (..., 12)."""
+    lam: Array
+    """Contact forces in the world's axes, foot by foot [N], shape (..., 3 feet)."""
+    guide: Array
+    """Forces [N] and moments [N m] of the guide in the world's axes, at the trunk's origin, in the
+    order of the coordinates it holds, shape (..., guides)."""
+    residual: Array
+    """Largest violation of the equations of motion, eq. (2) [N, N m], shape (...)."""
+    feasible: BoolArray
+    """Whether the equations hold to 1e-6 and, where friction was given, cones and torque limits
+    do too, shape (...)."""
+
+
+@dataclass(frozen=True)
+class Feedforward:
+    """Torques and forces of the model along a gait.
+
+    Attributes:
+        s: Phases, from 0 to 1, of both grids, shape (samples,).
+        stance: Motor torques in stance [N m], shape (samples, 12).
+        flight: Motor torques in flight [N m], shape (samples, 12).
+        lam: Contact forces in stance in the world's axes [N], shape (samples, 4, 3).
+        guide: Forces of the guide in stance, see `InverseDynamics`, shape (samples, guides).
+        feasible: Whether stance keeps to the equations, cones and limits, shape (samples,).
+    """
+
+    s: Array
+    stance: Array
+    flight: Array
+    lam: Array
+    guide: Array
+    feasible: BoolArray
+
+
+def inverse_dynamics(
+    robot: Robot,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    a: npt.ArrayLike,
+    *,
+    feet: Iterable[str] | None = None,
+    contact: Contact = "point",
+    friction: float | None = None,
+    torque_limits: npt.ArrayLike | None = None,
+    guide: Sequence[str] | None = None,
+) -> InverseDynamics:
+    """Motor torques and contact forces for a motion: eq. (2) solved for tau and lambda; batched.
+
+    Of all solutions the one with the smallest |tau|^2 (plus 1e-6 m^2 |lam|^2, which only decides
+    where straight legs leave the torques undecided). Without friction it is found in closed form
+    and forces may pull. With friction they stay in an inner pyramid of eight sides in the friction
+    cone, and torques within their limits: instants where the closed form violates these are solved
+    by ProxQP, each started from the one before. Where the base's equations cannot be met they are
+    violated least, and `feasible` is false. Whether the motion itself keeps the feet at rest is not
+    checked.
+
+    A motion and robot that are mirror images of themselves give left and right legs equal torques.
+    The trunk's centre of mass of the A1 is 4 mm off the mirror plane; a guide that holds roll, yaw
+    and y takes the difference, at no cost, so left and right are equal there too.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (..., 19).
+        v: Velocity, shape (..., 18).
+        a: Acceleration, shape (..., 18).
+        feet: Legs in contact; all if None, none if empty.
+        contact: "point" or "rolling": where the forces act, see `contact_jacobian`.
+        friction: Coefficient of friction; None for no cone and no limits.
+        torque_limits: Largest torques [N m], one or (12,), where friction is given; the robot's
+            own if None, none if infinite.
+        guide: Base coordinates that a guide holds, out of `GUIDE_COORDINATES`: forces along and
+            moments about the world's axes at the trunk's origin; None for a free base.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, a quaternion that is not normalised, friction or limits
+            that are not positive.
+        UnknownName: There is no such leg, contact or guide coordinate.
+    """
+    q, v = as_state(robot, q, v)
+    a = as_array("a", a, robot.nv, q.shape[:-1])
+    legs, axes = leg_indices(robot, feet), _guide_axes(guide)
+    motion = (q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), a.reshape(-1, robot.nv))
+    problem = _problem(robot, motion, legs, contact_radius(robot, contact), axes)
+    forces = _minimum_torque(problem)
+    inside = np.ones(len(forces), dtype=bool)
+    if friction is not None:
+        tau_max = _torque_limits(robot, torque_limits)
+        inside = _constrain(problem, forces, _positive("friction", friction), tau_max)
+
+    batch, split = q.shape[:-1], 3 * len(legs)
+    lam, held = forces[:, :split], forces[:, split:]
+    residual = np.abs(_apply(problem.wrench, forces) - problem.b_base).max(axis=-1)
+    return InverseDynamics(
+        tau=(problem.b_joints - _apply(problem.lever, lam)).reshape(*batch, robot.nu),
+        lam=lam.reshape(*batch, split),
+        guide=held.reshape(*batch, len(axes)),
+        residual=residual.reshape(batch),
+        feasible=(inside & (residual <= _TOLERANCE)).reshape(batch),
+    )
+
+
+def feedforward(
+    robot: Robot,
+    gait: Gait,
+    *,
+    samples: int = 101,
+    contact: Contact = "point",
+    friction: float | None = None,
+    torque_limits: npt.ArrayLike | None = None,
+    guide: Sequence[str] | None = None,
+) -> Feedforward:
+    """Torques of the model along a gait: inverse dynamics in stance and in flight.
+
+    Stance has the feet of its phase on the ground, flight has none; each is sampled on its own
+    phase from 0 to 1. In flight the torques move the joints as the gait asks while the trunk moves
+    as the gait says, whatever force that would need.
+
+    Args:
+        robot: The robot.
+        gait: The gait.
+        samples: Number of phases, at least 2.
+        contact: See `inverse_dynamics`, as the following.
+        friction: For stance.
+        torque_limits: For stance.
+        guide: For stance.
+
+    Raises:
+        InvalidInput: Fewer than two samples, or as `inverse_dynamics`.
+        UnknownName: As `inverse_dynamics`.
+    """
+    if samples < 2:
+        raise InvalidInput(f"samples={samples}; a phase needs at least 2")
+    s = np.linspace(0.0, 1.0, samples)
+    down, air = gait.stance.motion(robot, s), gait.flight.motion(robot, s)
+    stance = inverse_dynamics(
+        robot,
+        down.q,
+        down.v,
+        down.a,
+        feet=gait.stance.feet,
+        contact=contact,
+        friction=friction,
+        torque_limits=torque_limits,
+        guide=guide,
+    )
+    legs = leg_indices(robot, gait.stance.feet)
+    lam = np.zeros((samples, len(robot.legs), 3))
+    lam[:, legs] = stance.lam.reshape(samples, len(legs), 3)
+    flight = inverse_dynamics(robot, air.q, air.v, air.a, feet=())
+    return Feedforward(s, stance.tau, flight.tau, lam, stance.guide, stance.feasible)
+
+
+def _guide_axes(guide: Sequence[str] | None) -> list[int]:
+    """Indices of the guide's coordinates."""
+    axes = [
+        GUIDE_COORDINATES.index(known_name("guide coordinate", name, GUIDE_COORDINATES))
+        for name in guide or ()
+    ]
+    if len(set(axes)) != len(axes):
+        raise InvalidInput(f"guide={guide} names a coordinate twice; name each once")
+    return axes
+
+
+def _positive(name: str, value: float) -> float:
+    if not 0.0 < value < np.inf:
+        raise InvalidInput(f"{name}={value}; it must be positive and finite")
+    return float(value)
+
+
+def _torque_limits(robot: Robot, limits: npt.ArrayLike | None) -> Array:
+    """Torque limits of every motor [N m], shape (12,)."""
+    if limits is None:
+        return robot.tau_max
+    array = np.asarray(limits, dtype=float)
+    if array.shape not in ((), (robot.nu,)) or not np.all(array > 0.0):
+        raise InvalidInput(f"torque_limits must be one or {robot.nu} positive numbers")
+    return np.broadcast_to(array, (robot.nu,))
+
+
+def _problem(
+    robot: Robot,
+    motion: tuple[Array, Array, Array],
+    legs: Sequence[int],
+    radius: float,
+    axes: Sequence[int],
+) -> ForceProblem:
+    """The equations of motion at n instants of a motion (q, v, a), stacked."""
+    q, v, a = motion
+    needed = np.empty_like(v)  # (n, 18)
+    jacobian = np.empty((len(q), 3 * len(legs), robot.nv))
+    for row in range(len(q)):
+        needed[row] = pin.rnea(robot.model, robot.data, q[row], v[row], a[row])
+        jacobian[row] = jacobian_at(robot, q[row], legs, radius)
+    transposed = np.swapaxes(jacobian, -1, -2)  # (n, 18, 3 feet)
+    # World forces at the trunk's origin, in the trunk's axes as the base's equations are.
+    guide = np.zeros((len(q), NB, NB))
+    guide[:, :3, :3] = guide[:, 3:, 3:] = np.swapaxes(rotation_matrix(q[:, 3:7]), -1, -2)
+    return ForceProblem(
+        lever=transposed[:, NB:],
+        b_joints=needed[:, NB:],
+        wrench=np.concatenate([transposed[:, :NB], guide[:, :, list(axes)]], axis=-1),
+        b_base=needed[:, :NB],
+    )
+
+
+def _minimum_torque(problem: ForceProblem) -> Array:
+    """Forces y of n problems, shape (n, 3 feet + guides), without cones and limits.
+
+    First the smallest forces that meet the base's equations, or violate them least; then, among
+    forces that change nothing there, those that reduce the torques most.
+    """
+    n, _, size = problem.wrench.shape
+    _, motors, columns = problem.lever.shape
+    if size == 0:
+        return np.zeros((n, 0))
+    inverse = np.asarray(np.linalg.pinv(problem.wrench, rcond=_RANK))  # (n, size, 6)
+    forces = _apply(inverse, problem.b_base)
+    free = np.eye(size) - inverse @ problem.wrench  # (n, size, size)
+    cost = np.zeros((n, motors + columns, size))
+    cost[:, :motors, :columns] = problem.lever
+    cost[:, motors:, :columns] = np.sqrt(FORCE_WEIGHT) * np.eye(columns)
+    target = np.pad(problem.b_joints, ((0, 0), (0, columns)))
+    step = np.asarray(np.linalg.pinv(cost @ free, rcond=_RANK))  # (n, size, 12 + 3 feet)
+    return forces + _apply(step, target - _apply(cost, forces))
+
+
+def _constrain(problem: ForceProblem, forces: Array, friction: float, tau_max: Array) -> BoolArray:
+    """Bring the forces of n problems, in place, within cones and limits; which ones are, (n,)."""
+    size, columns = forces.shape[-1], problem.lever.shape[-1]
+    sides = cone_sides(friction, columns // 3)
+
+    def inside() -> BoolArray:
+        lam = forces[:, :columns]
+        tau = problem.b_joints - _apply(problem.lever, lam)
+        in_cone = (lam @ sides.T <= _TOLERANCE).all(axis=-1)
+        return np.asarray(in_cone & (np.abs(tau) <= tau_max + _TOLERANCE).all(axis=-1))
+
+    outside = np.flatnonzero(~inside())
+    if columns and outside.size:
+        qp = ForceQP(columns // 3, size - columns, friction, tau_max)
+        for row in outside:
+            forces[row] = qp.solve(ForceProblem(*(part[row] for part in problem)))
+    return inside()
+
+
+def _apply(matrices: Array, vectors: Array) -> Array:
+    """Matrices (n, i, j) times vectors (n, j)."""
+    return np.asarray(np.einsum("nij,nj->ni", matrices, vectors))

@@ -1,0 +1,245 @@
+"""Kinematics of the legs: feet from joints, joints from feet, trunk velocity from stance legs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from ._legs import LegGeometry, leg_geometry, leg_motion, turn_y
+from ._state import as_array, as_q, as_state, known_name, leg_indices
+from ._typing import Array, BoolArray
+from .conventions import rotation_matrix
+from .errors import InvalidInput
+from .robot import JOINTS, NB, NL, Robot
+
+Knee = Literal["backward", "forward"]
+"""Which way a knee points; backward is a negative calf angle, as on the A1."""
+
+Hip = Literal["above", "below"]
+"""Whether the hip is above its foot, as in standing and walking, or below it."""
+
+_ROUND_OFF = 1e-9
+"""How far a joint limit [rad] or the reach of the links may be exceeded by round-off."""
+
+
+class LegSolution(NamedTuple):
+    """Joint angles of one leg from the position of its foot."""
+
+    joints: Array
+    """Hip, thigh and calf angle [rad], shape (..., 3); for a target out of reach, those of the
+    stretched or folded leg that points at it."""
+    reachable: BoolArray
+    """Whether the links reach the target, whatever the joint limits, shape (...)."""
+    within_limits: BoolArray
+    """Whether the angles respect the joint limits, shape (...)."""
+
+
+def foot_positions(robot: Robot, q: npt.ArrayLike) -> Array:
+    """Centres of the feet in the world: g_l(q) of eq. (3); batched.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (..., 19).
+
+    Returns:
+        Positions [m], shape (..., 4, 3), in the order of `robot.legs`.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    """
+    q = as_q(robot, q)
+    positions = np.empty((*q.shape[:-1], len(robot.legs), 3))
+    for row in np.ndindex(q.shape[:-1]):
+        pin.framesForwardKinematics(robot.model, robot.data, q[row])
+        for leg, foot in enumerate(robot.foot_ids):
+            positions[(*row, leg)] = robot.data.oMf[foot].translation
+    return positions
+
+
+def foot_velocities(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
+    """Velocities of the feet's centres in the world: the middle of eq. (3); batched.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (..., 19).
+        v: Velocity, shape (..., 18).
+
+    Returns:
+        Velocities [m/s], shape (..., 4, 3), in the order of `robot.legs`.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    """
+    q, v = as_state(robot, q, v)
+    velocities = np.empty((*q.shape[:-1], len(robot.legs), 3))
+    model, data = robot.model, robot.data
+    for row in np.ndindex(q.shape[:-1]):
+        pin.forwardKinematics(model, data, q[row], v[row])
+        for leg, foot in enumerate(robot.foot_ids):
+            motion = pin.getFrameVelocity(model, data, foot, pin.LOCAL_WORLD_ALIGNED)
+            velocities[(*row, leg)] = motion.linear
+    return velocities
+
+
+def leg_inverse_kinematics(
+    robot: Robot,
+    positions: npt.ArrayLike,
+    *,
+    leg: str,
+    knee: Knee = "backward",
+    hip: Hip = "above",
+) -> LegSolution:
+    """Joint angles that put the centre of one foot at given positions; closed form, batched.
+
+    Args:
+        robot: The robot.
+        positions: Foot centres from the trunk's origin, in the trunk's frame [m], shape (..., 3).
+        leg: Name of the leg, as in `robot.legs`.
+        knee: Branch of the knee: "backward" or "forward".
+        hip: Branch of the hip: "above" the foot or "below" it.
+
+    Raises:
+        InvalidInput: A wrong shape or NaN, or the robot's legs have no closed form.
+        UnknownName: There is no such leg, knee or hip.
+    """
+    index = leg_indices(robot, [leg])[0]
+    known_name("knee", knee, ("backward", "forward"))
+    known_name("hip", hip, ("above", "below"))
+    offsets = LegGeometry(*(part[index] for part in leg_geometry(robot)))
+    target = as_array("positions", positions, 3, None) - offsets.hip
+    # The hip angle turns the plane y = side of the leg about x, until it holds the target.
+    side = offsets.thigh[1] + offsets.calf[1] + offsets.foot[1]
+    square = target[..., 1] ** 2 + target[..., 2] ** 2 - side**2
+    height = np.sqrt(np.maximum(square, 0.0)) * (-1.0 if hip == "above" else 1.0)
+    hip_angle = np.arctan2(target[..., 2], target[..., 1]) - np.arctan2(height, side)
+    x, z = target[..., 0] - offsets.thigh[0], height - offsets.thigh[2]
+    thigh_angle, calf_angle, in_plane = _two_links(offsets, x, z, knee)
+
+    limits = slice(len(JOINTS) * index, len(JOINTS) * (index + 1))
+    angles = np.stack([hip_angle, thigh_angle, calf_angle], axis=-1)
+    joints, within = _in_range(angles, robot.q_min[limits], robot.q_max[limits])
+    reachable = np.asarray(in_plane & (square >= -_ROUND_OFF))
+    return LegSolution(joints, reachable, within)
+
+
+def leg_odometry(
+    robot: Robot,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    *,
+    feet: Iterable[str] | None = None,
+    contact: Literal["point", "rolling"] = "rolling",
+) -> Array:
+    """Trunk velocity from legs that stand without slipping; closed form, batched.
+
+    With the foot's centre at c in the trunk, the trunk turning with w and the calf with w_calf,
+    the velocity of the foot's centre is that of a sphere rolling on the ground:
+
+        v_trunk + w x c + c_dot = w_calf x (r z)
+
+    and zero for a point contact. Each leg gives one velocity; the answer is their mean.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (..., 19); the position is not used.
+        v: Velocity, shape (..., 18); the base's linear velocity is not used.
+        feet: Legs in stance; all if None.
+        contact: "rolling", on spheres of `robot.foot_radius`, or "point", fixed at the centre.
+
+    Returns:
+        Linear velocity of the trunk's origin in the world [m/s], shape (..., 3).
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, a quaternion that is not normalised, or no foot at all.
+        UnknownName: There is no such leg or contact.
+    """
+    q, v = as_state(robot, q, v)
+    stance = leg_indices(robot, feet)
+    if not stance:
+        raise InvalidInput("odometry needs at least one leg in stance; feet is empty")
+    known_name("contact", contact, ("point", "rolling"))
+    shape = (*q.shape[:-1], len(robot.legs), len(JOINTS))
+    legs = leg_motion(leg_geometry(robot), q[..., 7:].reshape(shape), v[..., NB:].reshape(shape))
+    rotation = rotation_matrix(q[..., 3:7])
+    spin = v[..., None, 3:NB]  # (..., 1, 3)
+    velocity = -legs.velocity - np.cross(spin, legs.position)  # (..., legs, 3), in the trunk
+    if contact == "rolling":
+        up = robot.foot_radius * rotation[..., None, 2, :]  # (..., 1, 3)
+        velocity = velocity + np.cross(spin + legs.calf_rate, up)
+    mean = velocity[..., stance, :].mean(axis=-2)
+    return np.asarray(np.einsum("...ij,...j->...i", rotation, mean))
+
+
+def leg_angle(joints: npt.ArrayLike) -> Array:
+    """Leg angles: theta = q_thigh + q_calf / 2, below eq. (11) of the paper; batched.
+
+    Args:
+        joints: Joint angles [rad], shape (..., 12).
+
+    Returns:
+        Leg angles [rad], shape (..., 4); positive where the foot is behind the hip.
+
+    Raises:
+        InvalidInput: A wrong shape or NaN.
+    """
+    legs = as_array("joints", joints, NL, None)
+    return legs[..., 1 :: len(JOINTS)] + 0.5 * legs[..., 2 :: len(JOINTS)]
+
+
+def rotate_leg(robot: Robot, joints: npt.ArrayLike, delta: npt.ArrayLike) -> Array:
+    """Joint angles with the legs turned about the thigh joints at equal length; batched.
+
+    The inverse kinematics behind eq. (12). The thigh joint lies on the axis the leg turns about,
+    so its angle takes up the whole turn and hip and calf stay: exactly what
+    `leg_inverse_kinematics` gives for the turned foot.
+
+    Args:
+        robot: The robot.
+        joints: Joint angles [rad], shape (..., 12).
+        delta: Turn of the legs [rad], one or of a shape that broadcasts to (..., 4); positive
+            moves feet backward.
+
+    Raises:
+        InvalidInput: A wrong shape or NaN.
+    """
+    turned = as_array("joints", joints, robot.nu, None).copy()
+    thighs = turned[..., 1 :: len(JOINTS)]
+    try:
+        thighs += np.asarray(delta, dtype=float)
+    except ValueError as error:
+        raise InvalidInput(f"delta does not fit the legs, {thighs.shape}: {error}") from error
+    return turned
+
+
+def _two_links(
+    offsets: LegGeometry, x: Array, z: Array, knee: Knee
+) -> tuple[Array, Array, BoolArray]:
+    """Thigh and calf angle that put the foot at (x, z) from the thigh joint; whether they can."""
+    calf, foot = offsets.calf, offsets.foot
+    upper, lower = np.hypot(calf[0], calf[2]), np.hypot(foot[0], foot[2])
+    cosine = (x**2 + z**2 - upper**2 - lower**2) / (2.0 * upper * lower)
+    bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if knee == "backward" else 1.0)
+    calf_angle = bend + _pitch(calf[0], calf[2]) - _pitch(foot[0], foot[2])
+    leg = calf + turn_y(calf_angle, foot)  # from the thigh joint to the foot at zero thigh angle
+    thigh_angle = _pitch(x, z) - _pitch(leg[..., 0], leg[..., 2])
+    return thigh_angle, calf_angle, np.asarray(np.abs(cosine) <= 1.0 + _ROUND_OFF)
+
+
+def _in_range(angles: Array, low: Array, high: Array) -> tuple[Array, BoolArray]:
+    """Angles (..., 3) up to whole turns, as near the middle of their range as can be; whether all
+    are within it, shape (...)."""
+    # The middle counts: the thigh of the A1 goes beyond pi.
+    middle = 0.5 * (low + high)
+    middle = np.where(np.isfinite(middle), middle, 0.0)
+    joints = (angles - middle + np.pi) % (2.0 * np.pi) - np.pi + middle
+    inside = (joints >= low - _ROUND_OFF) & (joints <= high + _ROUND_OFF)
+    return joints, np.asarray(inside.all(axis=-1))
+
+
+def _pitch(x: Array, z: Array) -> Array:
+    """Angle about y that turns a vector pointing down into the direction of (x, z)."""
+    return np.arctan2(-x, -z)

@@ -1,0 +1,71 @@
+"""What the tests share: the robot, random states of it, and the same robot in MuJoCo."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import pytest
+
+from pronk_pin import Robot, load_robot
+from pronk_pin._typing import Array
+
+
+class States(NamedTuple):
+    """Random states within the joint limits, at any attitude."""
+
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+
+
+@pytest.fixture(scope="session")
+def robot() -> Robot:
+    return load_robot("a1")
+
+
+@pytest.fixture(scope="session")
+def random_states(robot: Robot) -> Callable[..., States]:
+    def draw(n: int, *, seed: int = 0) -> States:
+        rng = np.random.default_rng(seed)
+        quaternion = rng.normal(size=(n, 4))
+        quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
+        joints = rng.uniform(robot.q_min, robot.q_max, size=(n, robot.nu))
+        q = np.concatenate([rng.normal(size=(n, 3)), quaternion, joints], axis=-1)
+        v, a = 2.0 * rng.normal(size=(2, n, robot.nv))
+        return States(q, v, a, 5.0 * rng.normal(size=(n, robot.nu)))
+
+    return draw
+
+
+@pytest.fixture(scope="session")
+def crouches(robot: Robot) -> Callable[..., States]:
+    """States near standing, where contacts are well conditioned and forces moderate."""
+
+    def draw(n: int, *, seed: int = 0) -> States:
+        rng = np.random.default_rng(seed)
+        q = np.tile(robot.standing, (n, 1))
+        q[:, 7:] += 0.1 * rng.normal(size=(n, robot.nu))
+        v, a = rng.normal(size=(2, n, robot.nv))
+        return States(q, 0.5 * v, a, 3.0 * rng.normal(size=(n, robot.nu)))
+
+    return draw
+
+
+@pytest.fixture(scope="session")
+def mujoco_model(robot: Robot) -> mujoco.MjModel:
+    """The same URDF in MuJoCo, its trunk floating and without the meshes MuJoCo cannot read."""
+    root = ElementTree.parse(robot.urdf_path).getroot()
+    for link in root.iter("link"):
+        for shape in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(shape)
+    for joint in root.iter("joint"):
+        child = joint.find("child")
+        if child is not None and child.get("link") == robot.spec.base_link:
+            joint.set("type", "floating")
+    text = ElementTree.tostring(root, encoding="unicode")
+    return mujoco.MjSpec.from_string(text).compile()

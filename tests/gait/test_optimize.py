@@ -1,0 +1,116 @@
+"""The optimiser finds the gait, and says so when it does not."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pronk_pin.errors import GaitNotFound, InvalidInput
+from pronk_pin.gait import GaitLibrary, GaitProblem, GaitSolution, optimize_gait
+from pronk_pin.gait.optimize import TOLERANCE
+from pronk_pin.gait.reintegration import contact_terms, feet_positions, guided_rows
+from pronk_pin.robot import Robot
+
+COARSE = (4, 6)
+"""A mesh that is quick to solve, where accuracy does not matter."""
+
+
+def test_crude_guess_finds_the_shipped_gait(solution: GaitSolution, library: GaitLibrary) -> None:
+    shipped = library.at(0.3)
+    for mine, theirs in zip(solution.gait.phases, shipped.phases, strict=True):
+        assert mine.duration == pytest.approx(theirs.duration, abs=1e-6)
+        np.testing.assert_allclose(mine.joints, theirs.joints, atol=1e-5)
+
+
+def test_no_constraint_is_violated(solution: GaitSolution) -> None:
+    assert max(violation.value for violation in solution.violations.values()) <= TOLERANCE
+
+
+def test_neighbour_gives_a_quick_start(solution: GaitSolution, library: GaitLibrary) -> None:
+    problem = dataclasses.replace(solution.problem, speed=0.4)
+    warm = optimize_gait(problem, initial=solution)
+    assert warm.iterations < solution.iterations / 2
+    np.testing.assert_allclose(warm.gait.stance.joints, library.at(0.4).stance.joints, atol=1e-5)
+
+
+def test_touchdown_is_the_plastic_impact_of_the_whole_robot(solution: GaitSolution) -> None:
+    robot, lever = solution.problem.robot, solution.model.lever
+    before, after = solution.motions["flight"], solution.motions["stance"]
+    rows, q, v = guided_rows(robot), after.q[0], before.v[-1]
+    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]
+    jacobian = contact_terms(robot, q, v, lever).jacobian[:, rows]
+    kkt = np.block([[mass, -jacobian.T], [jacobian, np.zeros((12, 12))]])
+    solved = np.linalg.solve(kkt, np.concatenate([mass @ v[rows], np.zeros(12)]))
+    np.testing.assert_allclose(after.v[0, rows], solved[: len(rows)], atol=1e-8)
+    np.testing.assert_allclose(solution.impulse.ravel(), solved[len(rows) :], atol=1e-8)
+
+
+def test_motors_do_the_work_that_changes_the_energy(solution: GaitSolution) -> None:
+    robot = solution.problem.robot
+    for name, motion in solution.motions.items():
+        energy = [
+            pin.computeMechanicalEnergy(robot.model, robot.data, q, v)
+            for q, v in ((motion.q[0], motion.v[0]), (motion.q[-1], motion.v[-1]))
+        ]
+        power = np.sum(motion.tau * motion.v[:, 6:], axis=1)
+        work = np.sum(np.diff(motion.t[::2]) / 6 * (power[:-2:2] + 4 * power[1::2] + power[2::2]))
+        assert work == pytest.approx(energy[1] - energy[0], abs=1e-3), name
+
+
+def test_ground_carries_the_weight_over_a_stride(solution: GaitSolution) -> None:
+    robot, stance = solution.problem.robot, solution.motions["stance"]
+    force = stance.lam.sum(axis=1)  # (nodes, 3)
+    impulse = np.sum(
+        np.diff(stance.t[::2])[:, None] / 6 * (force[:-2:2] + 4 * force[1::2] + force[2::2]),
+        axis=0,
+    )
+    weight = robot.mass * robot.gravity * solution.gait.duration
+    np.testing.assert_allclose(
+        impulse + solution.impulse.sum(axis=0), [0.0, 0.0, weight], atol=1e-3
+    )
+
+
+def test_spherical_feet_roll_and_point_feet_stay(solution: GaitSolution) -> None:
+    robot = solution.problem.robot
+    point = optimize_gait(GaitProblem(robot, 0.3, contact="point", intervals=COARSE))
+
+    def travel(found: GaitSolution) -> np.ndarray:
+        q = found.motions["stance"].q
+        return feet_positions(robot, q[-1]) - feet_positions(robot, q[0])
+
+    q = solution.motions["stance"].q
+    turned = (q[-1] - q[0])[7:].reshape(4, 3)[:, 1:].sum(axis=1)  # thigh and calf [rad]
+    # The hips turn by less than 0.1 rad, so that the rolling is nearly in the plane.
+    np.testing.assert_allclose(travel(solution)[:, 0], robot.foot_radius * turned, rtol=0.02)
+    assert np.all(np.abs(travel(solution)[:, 0]) > 1e-3)
+    np.testing.assert_allclose(travel(point), 0.0, atol=1e-4)
+
+
+def test_an_impossible_gait_names_what_fights(robot: Robot) -> None:
+    with pytest.raises(GaitNotFound, match="worst violations") as caught:
+        optimize_gait(GaitProblem(robot, 0.3, apex=0.7, intervals=COARSE))
+    assert max(caught.value.violations.values()) > TOLERANCE
+    assert "apex height" in caught.value.violations
+
+
+def test_an_initial_solution_must_have_the_same_mesh(solution: GaitSolution) -> None:
+    finer = dataclasses.replace(solution.problem, intervals=(14, 16))
+    with pytest.raises(InvalidInput, match="mesh intervals"):
+        optimize_gait(finer, initial=solution)
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"stance": (0.3, 0.1)}, "the shorter one first"),
+        ({"friction": 0.0}, "friction is 0; it must be positive"),
+        ({"apex": 0.1}, "is not above the least trunk height"),
+        ({"intervals": (12, 15)}, "two even numbers, 4 or more"),
+    ],
+)
+def test_a_senseless_problem_is_refused(robot: Robot, change: dict, text: str) -> None:
+    with pytest.raises(InvalidInput, match=text):
+        GaitProblem(robot, 0.3, **change)

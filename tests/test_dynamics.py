@@ -1,0 +1,266 @@
+"""Dynamics agree with another engine, with their own derivatives, and with conservation laws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pronk_pin import Robot, dynamics
+from pronk_pin._typing import Array
+from pronk_pin.conventions import to_mujoco
+from pronk_pin.errors import InvalidInput, UnknownName
+from pronk_pin.kinematics import foot_positions, foot_velocities, leg_inverse_kinematics
+
+Draw = Callable[..., tuple[Array, Array, Array, Array]]
+
+CONTACTS = ("point", "rolling")
+STANCES = (None, ("FR", "RL"), ("RR",), ("RL", "FL", "FR"))
+
+
+def relative(value: Array, expected: Array) -> float:
+    """Largest error relative to the largest expected entry."""
+    return float(np.abs(value - expected).max() / np.abs(expected).max())
+
+
+def mujoco_velocity_map(robot: Robot, q: Array) -> Array:
+    """T with qvel = T v, by converting unit velocities."""
+    columns = to_mujoco(robot, np.tile(q, (robot.nv, 1)), np.eye(robot.nv)).qvel
+    assert columns is not None
+    return columns.T
+
+
+def test_mass_bias_and_jacobian_agree_with_mujoco(
+    robot: Robot, random_states: Draw, mujoco_model: mujoco.MjModel
+) -> None:
+    data = mujoco.MjData(mujoco_model)
+    mass = np.zeros((robot.nv, robot.nv))
+    for q, v, _, _ in zip(*random_states(40), strict=True):
+        # MuJoCo's accelerations where Pinocchio's are zero: the frames turn with the base.
+        converted = to_mujoco(robot, q, v, np.zeros(robot.nv))
+        data.qpos[:], data.qvel[:] = converted.qpos, converted.qvel
+        mujoco.mj_forward(mujoco_model, data)
+        mujoco.mj_fullM(mujoco_model, data, mass)
+        change = mujoco_velocity_map(robot, q)
+        bias = change.T @ (mass @ converted.qacc + data.qfrc_bias)
+        assert relative(dynamics.mass_matrix(robot, q), change.T @ mass @ change) < 1e-12
+        assert relative(dynamics.nonlinear_effects(robot, q, v), bias) < 1e-12
+        jacobian = np.zeros((3, robot.nv))
+        for row, (leg, place) in enumerate(zip(robot.legs, foot_positions(robot, q), strict=True)):
+            calf = mujoco_model.body(f"{leg}_calf").id
+            mujoco.mj_jac(mujoco_model, data, jacobian, None, place, calf)
+            ours = dynamics.contact_jacobian(robot, q)[3 * row : 3 * row + 3]
+            assert relative(ours, jacobian @ change) < 1e-12
+
+
+def test_bias_forces_are_coriolis_and_gravity(robot: Robot, random_states: Draw) -> None:
+    for q, v, _, _ in zip(*random_states(20), strict=True):
+        parts = dynamics.coriolis_matrix(robot, q, v) @ v + dynamics.gravity(robot, q)
+        assert relative(parts, dynamics.nonlinear_effects(robot, q, v)) < 1e-12
+        assert relative(dynamics.nonlinear_effects(robot, q, 0 * v), dynamics.gravity(robot, q)) < (
+            1e-12
+        )
+
+
+def test_motors_act_on_joints_only(robot: Robot) -> None:
+    selection = dynamics.selection_matrix(robot)
+    tau = np.arange(12.0)
+    np.testing.assert_array_equal(selection @ tau, np.concatenate([np.zeros(6), tau]))
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_contact_bias_is_the_rate_of_the_jacobian(
+    robot: Robot, random_states: Draw, contact: str
+) -> None:
+    step = 1e-6
+    for q, v, _, _ in zip(*random_states(10), strict=True):
+        ahead, behind = (
+            dynamics.contact_jacobian(
+                robot, pin.integrate(robot.model, q, sign * step * v), contact=contact
+            )
+            @ v
+            for sign in (1, -1)
+        )
+        bias = dynamics.contact_bias(robot, q, v, contact=contact)
+        assert relative(bias, (ahead - behind) / (2 * step)) < 1e-6
+
+
+def test_the_jacobian_is_the_derivative_of_the_feet(robot: Robot, random_states: Draw) -> None:
+    step = 1e-6
+    for q, _, _, _ in zip(*random_states(5), strict=True):
+        columns = [
+            foot_positions(robot, pin.integrate(robot.model, q, step * axis))
+            - foot_positions(robot, pin.integrate(robot.model, q, -step * axis))
+            for axis in np.eye(robot.nv)
+        ]
+        numeric = np.stack(columns, axis=-1).reshape(12, robot.nv) / (2 * step)
+        assert relative(dynamics.contact_jacobian(robot, q), numeric) < 1e-7
+
+
+def test_a_rolling_foot_rests_at_its_lowest_point(robot: Robot, random_states: Draw) -> None:
+    down = np.array([0.0, 0.0, -robot.foot_radius])
+    for q, v, _, _ in zip(*random_states(10), strict=True):
+        rolling = dynamics.contact_jacobian(robot, q, contact="rolling") @ v
+        pin.forwardKinematics(robot.model, robot.data, q, v)
+        for leg, foot in enumerate(robot.foot_ids):
+            world = pin.LOCAL_WORLD_ALIGNED
+            motion = pin.getFrameVelocity(robot.model, robot.data, foot, world)
+            lowest = motion.linear + np.cross(motion.angular, down)
+            np.testing.assert_allclose(rolling[3 * leg : 3 * leg + 3], lowest, atol=1e-12)
+
+
+def test_rows_follow_the_feet_asked_for(robot: Robot) -> None:
+    every = dynamics.contact_jacobian(robot, robot.standing)
+    some = dynamics.contact_jacobian(robot, robot.standing, feet=("RR", "FL"))
+    np.testing.assert_array_equal(some, np.concatenate([every[9:], every[:3]]))
+    assert dynamics.contact_jacobian(robot, robot.standing, feet=()).shape == (0, 18)
+
+
+def test_flight_satisfies_the_equations_of_motion(robot: Robot, random_states: Draw) -> None:
+    states = random_states(20)
+    q, v, _, tau = states
+    for row, a in enumerate(dynamics.flight_dynamics(robot, q, v, tau)):
+        needed = dynamics.mass_matrix(robot, q[row]) @ a
+        needed += dynamics.nonlinear_effects(robot, q[row], v[row])
+        np.testing.assert_allclose(needed, np.r_[np.zeros(6), tau[row]], atol=1e-10)
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("feet", STANCES)
+def test_stance_solves_the_equations_of_the_paper(
+    robot: Robot, random_states: Draw, contact: str, feet: tuple[str, ...] | None
+) -> None:
+    for q, v, _, tau in zip(*random_states(25), strict=True):
+        solution = dynamics.stance_dynamics(robot, q, v, tau, feet=feet, contact=contact)
+        matrix, rhs = dynamics.stance_dae(robot, q, v, tau, feet=feet, contact=contact)
+        dense = np.linalg.solve(matrix, rhs)
+        assert relative(np.concatenate([solution.a, solution.lam]), dense) < 1e-9
+        jacobian = dynamics.contact_jacobian(robot, q, feet=feet, contact=contact)
+        bias = dynamics.contact_bias(robot, q, v, feet=feet, contact=contact)
+        assert np.abs(jacobian @ solution.a + bias).max() < 1e-9
+        assert not solution.singular
+
+
+def test_stance_without_feet_is_flight(robot: Robot, random_states: Draw) -> None:
+    q, v, _, tau = random_states(5)
+    stance = dynamics.stance_dynamics(robot, q, v, tau, feet=())
+    np.testing.assert_allclose(stance.a, dynamics.flight_dynamics(robot, q, v, tau))
+    assert stance.lam.shape == (5, 0)
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_a_batch_of_stances_is_solved_like_its_rows(
+    robot: Robot, crouches: Draw, contact: str
+) -> None:
+    q, v, _, tau = crouches(6)
+    shaped = (x.reshape(2, 3, -1) for x in (q, v, tau))
+    batch = dynamics.stance_dynamics(robot, *shaped, contact=contact)
+    one = dynamics.stance_dynamics(robot, q[4], v[4], tau[4], contact=contact)
+    np.testing.assert_array_equal(batch.a[1, 1], one.a)
+    np.testing.assert_array_equal(batch.lam[1, 1], one.lam)
+    assert batch.singular.shape == (2, 3)
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_baumgarte_pulls_drifting_feet_back(robot: Robot, crouches: Draw, contact: str) -> None:
+    kp, kd = 400.0, 40.0
+    q, v, _, tau = (x[0] for x in crouches(1))
+    a = dynamics.stance_dynamics(robot, q, v, tau, baumgarte=(kp, kd), contact=contact).a
+    jacobian = dynamics.contact_jacobian(robot, q, contact=contact)
+    achieved = jacobian @ a + dynamics.contact_bias(robot, q, v, contact=contact)
+    wanted = -kd * jacobian @ v
+    wanted[2::3] -= kp * (foot_positions(robot, q)[:, 2] - robot.foot_radius)
+    np.testing.assert_allclose(achieved, wanted, atol=1e-9)
+
+
+def stretched(robot: Robot) -> Array:
+    """Legs straight below their hips: vertical forces can cancel without moving anything."""
+    q = robot.standing.copy()
+    for index, leg in enumerate(robot.legs):
+        straight = np.hypot(0.0838, 0.4)
+        hip = robot.model.jointPlacements[2 + 3 * index].translation
+        target = hip - [0.0, 0.0, straight]
+        q[7 + 3 * index : 10 + 3 * index] = leg_inverse_kinematics(robot, target, leg=leg).joints
+    return q
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_singular_stance_says_so_and_stays_finite(
+    robot: Robot, random_states: Draw, contact: str, moving: bool
+) -> None:
+    q, (_, v, _, tau) = stretched(robot), (x[0] for x in random_states(1))
+    v = v * moving
+    solution = dynamics.stance_dynamics(robot, q, v, tau, contact=contact)
+    matrix, rhs = dynamics.stance_dae(robot, q, v, tau, contact=contact)
+    assert solution.singular
+    assert np.abs(solution.lam).max() < 1e4
+    residual = matrix @ np.concatenate([solution.a, solution.lam]) - rhs
+    assert np.abs(residual[:18]).max() < 1e-9
+    if not moving:  # then the feet can keep their acceleration of zero
+        assert np.abs(residual[18:]).max() < 1e-6
+    after = dynamics.impact(robot, q, v, contact=contact)
+    assert after.singular
+    assert np.isfinite(after.v).all()
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("feet", STANCES)
+def test_a_plastic_impact_stops_the_feet_and_keeps_the_momentum(
+    robot: Robot, random_states: Draw, contact: str, feet: tuple[str, ...] | None
+) -> None:
+    for q, v, _, _ in zip(*random_states(10), strict=True):
+        after = dynamics.impact(robot, q, v, feet=feet, contact=contact)
+        jacobian = dynamics.contact_jacobian(robot, q, feet=feet, contact=contact)
+        mass = dynamics.mass_matrix(robot, q)
+        assert np.abs(jacobian @ after.v).max() < 1e-10
+        assert np.abs(mass @ (after.v - v) - jacobian.T @ after.impulse).max() < 1e-10
+        # The whole robot's linear momentum changes by the sum of the impulses.
+        before = pin.computeCentroidalMomentum(robot.model, robot.data, q, v).linear.copy()
+        gained = pin.computeCentroidalMomentum(robot.model, robot.data, q, after.v).linear - before
+        np.testing.assert_allclose(gained, after.impulse.reshape(-1, 3).sum(axis=0), atol=1e-10)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])
+def test_an_impact_never_creates_energy(
+    robot: Robot, random_states: Draw, restitution: float
+) -> None:
+    for q, v, _, _ in zip(*random_states(20), strict=True):
+        after = dynamics.impact(robot, q, v, restitution=restitution)
+        mass = dynamics.mass_matrix(robot, q)
+        before, left = v @ mass @ v, after.v @ mass @ after.v
+        assert left <= before * (1 + 1e-12)
+        if restitution == 1.0:
+            assert left == pytest.approx(before, rel=1e-10)
+        bounced = foot_velocities(robot, q, after.v)
+        expected = -restitution * foot_velocities(robot, q, v)
+        np.testing.assert_allclose(bounced, expected, atol=1e-10)
+
+
+def test_wrong_arguments_are_refused_with_a_remedy(robot: Robot) -> None:
+    q, v, tau = robot.standing, np.zeros(18), np.zeros(12)
+    with pytest.raises(InvalidInput, match=r"v has shape \(12,\) where \(18,\) is expected"):
+        dynamics.flight_dynamics(robot, q, tau, tau)
+    with pytest.raises(InvalidInput, match=r"tau has shape \(12,\) where \(2, 12\)"):
+        dynamics.stance_dynamics(robot, np.tile(q, (2, 1)), np.zeros((2, 18)), tau)
+    with pytest.raises(InvalidInput, match="one state at a time"):
+        dynamics.mass_matrix(robot, q[None])
+    with pytest.raises(InvalidInput, match="NaN"):
+        dynamics.nonlinear_effects(robot, q, v * np.nan)
+    with pytest.raises(InvalidInput, match="normalise it first"):
+        dynamics.impact(robot, 1.1 * q, v)
+    with pytest.raises(InvalidInput, match="from 0 to 1"):
+        dynamics.impact(robot, q, v, restitution=1.5)
+    with pytest.raises(InvalidInput, match="0 or positive"):
+        dynamics.stance_dynamics(robot, q, v, tau, baumgarte=(-1.0, 0.0))
+    with pytest.raises(InvalidInput, match=r"baumgarte has shape \(1,\)"):
+        dynamics.stance_dynamics(robot, q, v, tau, baumgarte=(1.0,))
+    with pytest.raises(InvalidInput, match="name each leg once"):
+        dynamics.contact_jacobian(robot, q, feet=("FL", "FL"))
+    with pytest.raises(UnknownName, match="unknown leg 'LF'; choose one of: FL, FR, RL, RR"):
+        dynamics.contact_jacobian(robot, q, feet=("LF",))
+    with pytest.raises(UnknownName, match="choose one of: point, rolling"):
+        dynamics.contact_bias(robot, q, v, contact="sliding")

@@ -1,0 +1,101 @@
+"""The robot is read from its URDF, and complaints about it say what to do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pronk_pin import Robot, RobotSpec, load_robot
+from pronk_pin.errors import FileProblem, InvalidInput, UnknownName
+from pronk_pin.kinematics import foot_positions
+from pronk_pin.robot import ROBOTS
+
+
+def test_the_a1_has_the_sizes_of_the_paper(robot: Robot) -> None:
+    assert (robot.nq, robot.nv, robot.nu) == (19, 18, 12)
+    assert robot.mass == pytest.approx(13.741)
+    assert robot.gravity == pytest.approx(9.81)
+    assert robot.foot_radius == pytest.approx(0.02)
+
+
+def test_limits_come_from_the_urdf(robot: Robot) -> None:
+    np.testing.assert_allclose(robot.tau_max, 33.5)
+    np.testing.assert_allclose(robot.v_max, 21.0)
+    assert (robot.q_min < robot.q_max).all()
+
+
+def test_joints_and_feet_are_found_by_name(robot: Robot) -> None:
+    assert robot.joint_names == tuple(robot.model.names[2:])
+    assert sorted(robot.urdf_joint_names) == sorted(robot.joint_names)
+    found = [robot.model.frames[index].name for index in robot.foot_ids]
+    assert tuple(found) == robot.foot_names
+
+
+def test_standing_puts_all_feet_on_the_ground(robot: Robot) -> None:
+    np.testing.assert_allclose(foot_positions(robot, robot.standing)[:, 2], robot.foot_radius)
+
+
+def test_base_pitch_becomes_a_rotation_about_y(robot: Robot) -> None:
+    pitch = np.array([0.0, 0.3, -1.2])
+    q = robot.q_from_base(np.ones((3, 3)), np.zeros((3, 12)), pitch=pitch)
+    for row, angle in zip(q, pitch, strict=True):
+        matrix = pin.Quaternion(row[3:7]).matrix()
+        np.testing.assert_allclose(matrix, pin.rpy.rpyToMatrix(0.0, angle, 0.0), atol=1e-15)
+
+
+def test_a_robot_is_loaded_once(robot: Robot) -> None:
+    assert load_robot("a1") is robot
+    assert load_robot(RobotSpec("a1", "a1_description/urdf/a1.urdf")) is robot
+
+
+def test_an_unknown_robot_is_answered_with_the_known_ones() -> None:
+    with pytest.raises(UnknownName, match="unknown robot 'spot'; choose one of: a1"):
+        load_robot("spot")
+
+
+def test_a_missing_urdf_is_named() -> None:
+    with pytest.raises(FileProblem, match=r"nowhere\.urdf"):
+        load_robot(RobotSpec("lost", "/nowhere.urdf"))
+    with pytest.raises(FileProblem, match="pip install"):
+        load_robot(RobotSpec("lost", "nowhere.urdf"))
+
+
+def test_a_urdf_of_ones_own_is_read_from_its_path(robot: Robot) -> None:
+    own = load_robot(RobotSpec("mine", str(robot.urdf_path)))
+    assert own.name == "mine"
+    assert own.sha256 == robot.sha256
+    np.testing.assert_array_equal(own.standing, robot.standing)
+
+
+def test_a_damaged_urdf_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "broken.urdf"
+    path.write_text("<robot name='half'><link")
+    with pytest.raises(FileProblem, match=r"broken\.urdf: not a usable URDF"):
+        load_robot(RobotSpec("broken", str(path)))
+
+
+def test_feet_need_a_sphere(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "footless.urdf"
+    text = robot.urdf_path.read_text()
+    path.write_text(text.replace('<sphere radius="0.02"/>', '<box size="0.02 0.02 0.02"/>'))
+    with pytest.raises(InvalidInput, match="no collision sphere"):
+        load_robot(RobotSpec("footless", str(path)))
+
+
+@pytest.mark.parametrize(
+    ("change", "remedy"),
+    [
+        ({"joint_pattern": "{leg}-{joint}"}, "adapt joint_pattern"),
+        ({"legs": ("FR", "FL", "RL", "RR")}, "legs of the RobotSpec"),
+        ({"foot_pattern": "{leg}_toe"}, "adapt foot_pattern"),
+    ],
+)
+def test_a_specification_that_does_not_fit_is_explained(
+    change: dict[str, object], remedy: str
+) -> None:
+    with pytest.raises(InvalidInput, match=remedy):
+        load_robot(replace(ROBOTS["a1"], **change))
