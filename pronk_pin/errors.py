@@ -12,6 +12,17 @@ from pathlib import Path
 class PronkError(Exception):
     """Base class of all errors of this package."""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the finished message, so that errors of worker processes arrive whole."""
+        return _restore, (type(self), str(self)), self.__dict__
+
+
+def _restore(kind: type[PronkError], message: str) -> PronkError:
+    """An error with its message; `__init__` would ask for what the message was made of."""
+    error = kind.__new__(kind)
+    error.args = (message,)
+    return error
+
 
 class UnknownName(PronkError):
     """A robot, controller, scenario or the like that does not exist.

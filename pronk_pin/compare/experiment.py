@@ -56,7 +56,8 @@ class Experiment:
         load_robot(self.robot)
         library = load_library(self.robot)
         for name in ("speeds", "controllers", "scenarios", "seeds"):
-            values = getattr(self, name)
+            values = tuple(getattr(self, name))
+            object.__setattr__(self, name, values)  # a list would not equal what is read back
             if len(values) == 0 or len(set(values)) != len(values):
                 raise InvalidInput(f"{name} must name at least one, and none of them twice")
         for speed in self.speeds:

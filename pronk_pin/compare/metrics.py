@@ -23,9 +23,13 @@ COLUMNS = [*KEYS, "value", "unit"]
 
 
 def steady(strides: xr.Dataset) -> xr.Dataset:
-    """The last `STEADY_STRIDES` finished strides of each speed, renumbered from 0."""
+    """The last `STEADY_STRIDES` finished strides of each speed, renumbered from 0.
+
+    Where a law learned, none from before it was switched on: fewer, then, after a short learning.
+    """
     count = strides["count"].to_numpy()
-    last = min(STEADY_STRIDES, int(count.min()))
+    learned = (strides["learning"] == 1).sum("stride").to_numpy()
+    last = min(STEADY_STRIDES, int(np.where(learned > 0, learned, count).min()))
     offset = xr.DataArray(np.arange(last), dims="stride")
     start = xr.DataArray(count - last, dims="speed", coords={"speed": strides["speed"]})
     return strides.isel(stride=start + offset)
@@ -91,10 +95,11 @@ def _rows(strides: xr.Dataset, k: int) -> Iterator[dict[str, object]]:
 
 
 def feedback_share(strides: xr.Dataset) -> float:
-    """RMS of the feedback torque over the sum of the RMS of feedback and feedforward."""
+    """RMS of the feedback torque over the sum of both RMS; NaN where there is no torque at all."""
     feedback = float(np.sqrt((strides["feedback"] ** 2).mean()))
     feedforward = float(np.sqrt((strides["feedforward"] ** 2).mean()))
-    return feedback / (feedback + feedforward)
+    total = feedback + feedforward
+    return feedback / total if total > 0.0 else float("nan")
 
 
 def strides_to_converge(strides: xr.Dataset, joint: str) -> float:
@@ -102,7 +107,7 @@ def strides_to_converge(strides: xr.Dataset, joint: str) -> float:
 
     The first stride from which on every peak error (mean over the legs) misses at most `SETTLED` of
     the improvement between the steady states before learning and at the end. NaN if learning did
-    not improve the error.
+    not improve the error, or if there were no strides before it.
 
     Args:
         strides: The strides of one robot.
@@ -112,8 +117,10 @@ def strides_to_converge(strides: xr.Dataset, joint: str) -> float:
     peak = peak[: int(strides["count"])]
     learning = strides["learning"].to_numpy()[: len(peak)] == 1
     start = int(np.argmax(learning))
-    before = float(np.mean(peak[max(start - STEADY_STRIDES, 0) : start]))
-    final = float(np.mean(peak[-STEADY_STRIDES:]))
+    if start == 0:
+        return float("nan")
+    before = float(np.mean(peak[:start][-STEADY_STRIDES:]))
+    final = float(np.mean(peak[start:][-STEADY_STRIDES:]))
     return settling_stride(peak[start:], before, final)
 
 

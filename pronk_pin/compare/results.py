@@ -13,6 +13,7 @@ replay.html            the robot beside the reference, in one file
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib.metadata
 import json
@@ -27,7 +28,7 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
-from ..errors import FileProblem, InvalidInput
+from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, UnknownName
 from .experiment import Cell, Experiment
 from .metrics import COLUMNS, KEYS, summarize
 from .simulate import Schedule
@@ -37,6 +38,10 @@ SCHEMA = 1
 
 _PACKAGES = ("pronk-pin", "pin", "example-robot-data", "mujoco", "proxsuite", "numpy", "scipy")
 _AGAIN = "run 'pronk-pin compare' to make one"
+_DAMAGE = (
+    *(ValueError, KeyError, TypeError, AttributeError),
+    *(InvalidInput, UnknownName, SpeedOutOfRange),
+)
 
 
 @dataclass(frozen=True)
@@ -59,10 +64,9 @@ class Results:
             FileProblem: It cannot be written, or belongs to another experiment.
         """
         results = cls(folder, experiment)
-        if (folder / "config.json").exists():
-            if cls.load(folder).experiment != experiment:
-                raise FileProblem(folder, "holds another experiment", "choose another folder")
-            return results
+        taken = (folder / "config.json").exists()
+        if taken and cls.load(folder).experiment != experiment:
+            raise FileProblem(folder, "holds another experiment", "choose another folder")
         try:
             (folder / "strides").mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -70,7 +74,8 @@ class Results:
             raise FileProblem(
                 folder, f"cannot be written ({reason})", "choose a folder of yours with --folder"
             ) from error
-        results.write_config({"finished": False})
+        if not taken:
+            results.write_config({"finished": False})
         return results
 
     @classmethod
@@ -89,7 +94,7 @@ class Results:
             if config["schema"] != SCHEMA:
                 raise FileProblem(path, f"schema {config['schema']}, not {SCHEMA}", _AGAIN)
             return cls(folder, _experiment(config["experiment"]))
-        except (ValueError, KeyError, TypeError, InvalidInput) as error:
+        except _DAMAGE as error:
             raise FileProblem(path, f"damaged ({error})", _AGAIN) from error
 
     @property
@@ -133,9 +138,10 @@ class Results:
         try:
             strides.to_netcdf(partial, engine="netcdf4", encoding=encoding)
             partial.replace(path)
-        except OSError as error:
-            partial.unlink(missing_ok=True)
-            reason = error.strerror or str(error)
+        except (OSError, RuntimeError) as error:
+            with contextlib.suppress(OSError):
+                partial.unlink()
+            reason = getattr(error, "strerror", None) or str(error)
             raise FileProblem(
                 path, f"cannot be written ({reason})", "make room, and run the same command again"
             ) from error

@@ -16,6 +16,7 @@ from tqdm import tqdm
 from ..errors import InvalidInput
 from .experiment import Cell, Experiment, run_cell
 from .results import Results
+from .simulate import Progress
 
 _steps_done: Synchronized[int] | None = None
 
@@ -60,13 +61,15 @@ def run_experiment(
         else:
             _in_processes(results, cells, workers, bar)
     results.summarize()
+    if not cells and results.config.get("finished"):
+        return results  # who made the strides stays on record
     results.write_config({"finished": True, "wall_time_s": round(time.monotonic() - began, 1)})
     return results
 
 
-def _simulate(results: Results, cell: Cell, progress: object) -> None:
+def _simulate(results: Results, cell: Cell, progress: Progress) -> None:
     practised = results.strides(cell.practised) if cell.practised else None
-    results.save(cell, run_cell(cell, practised, progress))  # type: ignore[arg-type]
+    results.save(cell, run_cell(cell, practised, progress))
 
 
 def _in_processes(results: Results, cells: list[Cell], workers: int, bar: tqdm[Any]) -> None:

@@ -47,7 +47,7 @@ class Scenario:
         for quantity in ("torque_constant", "ground_friction", "timestep"):
             if not getattr(self, quantity) > 0.0:
                 raise InvalidInput(f"scenario '{self.name}': {quantity} must be positive")
-        if self.ground_time_constant < 2 * self.timestep:
+        if not self.ground_time_constant >= 2 * self.timestep:
             raise InvalidInput(
                 f"scenario '{self.name}': a ground_time_constant below two time steps "
                 f"({2 * self.timestep:g} s) is unstable; make it larger"

@@ -12,14 +12,14 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .._typing import Array, BoolArray, IntArray
+from .._typing import Array, IntArray
 from ..control import Controller, ControllerSpec, PhaseLog, Player, phase_grid
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..robot import NL, Robot
 from .record import StrideLog
 from .scenario import Scenario
-from .world import World
+from .world import World, without_warnings
 
 Progress: TypeAlias = Callable[[int], object]
 """Called with the number of time steps done since the last call."""
@@ -32,6 +32,10 @@ _TOUCHDOWN_LOAD = 0.1
 
 _FALLEN = 0.6
 """Trunk height, over that of the gait's lowest point, below which a robot has fallen."""
+
+
+_SHORTEST = 1.0
+"""Shortest practice and learning [s]: even a robot that lies on the ground finishes a stride."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +55,16 @@ class Schedule:
     scatter: float = 0.01
 
     def __post_init__(self) -> None:
-        if min(self.startup, self.practice, self.learning, self.scatter) < 0.0:
-            raise InvalidInput("the durations of a schedule must not be negative")
+        values = (self.startup, self.practice, self.learning, self.scatter)
+        if not all(0.0 <= value < np.inf for value in values):
+            raise InvalidInput(
+                "the durations and the scatter of a schedule must be finite and not negative"
+            )
+        if self.practice + self.learning < _SHORTEST:
+            raise InvalidInput(
+                f"practice and learning of {self.practice:g} + {self.learning:g} s are too short "
+                f"for a stride; make them {_SHORTEST:g} s or more together"
+            )
 
     @property
     def duration(self) -> float:
@@ -118,13 +130,20 @@ class Simulation:
         Args:
             progress: Called with the number of steps done since the last call.
         """
-        dt, schedule = self._dt, self.schedule
-        learns = self.controller.spec.law is not None
-        for _ in range(round(schedule.startup / dt)):
-            tape = self.controller.stand(1)
-            self._player.load(self._rows, tape)
+        with without_warnings():
+            self._startup()
+            self._pronk(progress)
+        return self.log
+
+    def _startup(self) -> None:
+        for _ in range(round(self.schedule.startup / self._dt)):
+            self._player.load(self._rows, self.controller.stand(1))
             self._advance()
         self._begin_stance(self._rows, np.full(len(self._rows), np.inf), 0.0)
+
+    def _pronk(self, progress: Progress | None) -> None:
+        dt, schedule = self._dt, self.schedule
+        learns = self.controller.spec.law is not None
         steps = round((schedule.practice + schedule.learning) / dt)
         for step in range(steps):
             time = step * dt
@@ -135,7 +154,6 @@ class Simulation:
                 progress(500)
         if progress is not None:
             progress(steps % 500)
-        return self.log
 
     def _advance(self) -> None:
         """One tick: play the tapes, log, step the world."""
@@ -147,27 +165,24 @@ class Simulation:
         self._base[at] = world.base
         world.step(torque)
         player.tick += 1
+        broken = ~world.finite
+        if broken.any():
+            world.freeze(np.flatnonzero(broken))
+            self.upright &= ~broken
 
     def _events(self, time: float) -> None:
-        """Lift-offs by time, touchdowns by contact."""
+        """Lift-offs by time, touchdowns by contact; who has fallen."""
         player, world = self._player, self.world
         over = player.tick >= player.length
         landed = (world.force[:, :, 2].sum(axis=1) > self._load) & (player.tick > self._earliest)
-        self._check(over & self._flying)
+        too_low = world.base[:, 1] < self._floor
+        self.upright &= ~(too_low | (over & self._flying))  # or a touchdown missed
         for rows, event in (
             (np.flatnonzero(over & ~self._flying), self._begin_flight),
             (np.flatnonzero((landed | over) & self._flying), self._end_flight),
         ):
             if rows.size:
                 event(rows, time)
-
-    def _check(self, missed: BoolArray) -> None:
-        """Note who has fallen: too low, a touchdown missed, or not finite any more."""
-        fallen = missed | (self.world.base[:, 1] < self._floor)
-        broken = ~self.world.finite
-        if broken.any():
-            self.world.freeze(np.flatnonzero(broken))
-        self.upright &= ~(fallen | broken)
 
     def _begin_flight(self, rows: IntArray, time: float) -> None:
         log = self._phase_log(rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,8 @@ from ..control import phase_grid
 from ..gait import Gait
 from ..robot import Robot
 from .record import SAMPLES, StrideLog
+
+_Variable: TypeAlias = tuple[tuple[str, ...], npt.NDArray[np.floating[Any]]]
 
 _UNITS = {
     "count": ("1", "finished strides"),
@@ -46,18 +48,10 @@ def to_dataset(
     (by name, in Pinocchio's order), `axis` (x, z). Unfinished strides are cut off.
     """
     last = int(log.count.max(initial=0))
-    per_stride, per_joint = ("speed", "stride"), ("speed", "stride", "joint")
-    curve = ("speed", "stride", "phase", "joint")
-    variables: dict[str, tuple[tuple[str, ...], npt.NDArray[np.floating[Any]]]] = {
-        ("mean_speed" if name == "speed" else name): (per_stride, values[:, :last])
-        for name, values in log.scalars.items()
+    recorded = {
+        name: (dimensions, values[:, :last])
+        for name, (dimensions, values) in _recorded(log).items()
     }
-    variables["peak_error"] = (per_joint, log.peak_error[:, :last])
-    variables["rms_error"] = (per_joint, log.rms_error[:, :last])
-    for name, values in log.curves.items():
-        variables[name] = (curve, values[:, :last])
-    for name, values in log.base.items():
-        variables[f"base_{name}"] = (("speed", "stride", "phase", "axis"), values[:, :last])
     grid = phase_grid(SAMPLES)
     reference = np.stack([gait.stance.joint_reference(grid)[0] for gait in gaits])
     dataset = xr.Dataset(
@@ -66,7 +60,7 @@ def to_dataset(
             "planned_apex": ("speed", [gait.apex for gait in gaits]),
             "planned_duration": ("speed", [gait.duration for gait in gaits]),
             "reference": (("speed", "phase", "joint"), reference),
-            **variables,
+            **recorded,
         },
         coords={
             "speed": ("speed", [gait.speed for gait in gaits], {"units": "m/s"}),
@@ -84,3 +78,17 @@ def to_dataset(
             dataset[name] = dataset[name].where(finished)
         dataset[name].attrs.update(units=unit, long_name=text)
     return dataset
+
+
+def _recorded(log: StrideLog) -> dict[str, _Variable]:
+    """What the log holds, by name, with its dimensions."""
+    per_stride, per_joint = ("speed", "stride"), ("speed", "stride", "joint")
+    curve, path = (*per_stride, "phase", "joint"), (*per_stride, "phase", "axis")
+    names = {"speed": "mean_speed"}  # the desired one is the coordinate
+    return {
+        **{names.get(name, name): (per_stride, array) for name, array in log.scalars.items()},
+        "peak_error": (per_joint, log.peak_error),
+        "rms_error": (per_joint, log.rms_error),
+        **{name: (curve, array) for name, array in log.curves.items()},
+        **{f"base_{name}": (path, array) for name, array in log.base.items()},
+    }

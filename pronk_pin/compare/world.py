@@ -8,6 +8,8 @@ Pinocchio's order.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import mujoco
 import mujoco.rollout
@@ -39,6 +41,8 @@ def build_model(robot: Robot, scenario: Scenario, *, free: bool = False) -> mujo
     spec.option.impratio = 10.0
     # MuJoCo 4.0.0 has a bug in Newton's sparse Cholesky; dense is faster at this size anyway.
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    # A state that is not finite must be seen, not replaced by the zero posture.
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
 
     trunk = spec.body(robot.spec.base_link)
     if not free:
@@ -132,6 +136,17 @@ def _add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
         )
 
 
+@contextmanager
+def without_warnings() -> Iterator[None]:
+    """Keep MuJoCo from writing warnings to a file in the current folder: `World.finite` tells."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
+
+
 class World:
     """n robots, each alone in the same world, stepped together.
 
@@ -202,8 +217,8 @@ class World:
 
     @property
     def finite(self) -> BoolArray:
-        """Which robots still have finite states, shape (n,)."""
-        return np.asarray(np.isfinite(self._state[:, 0]).all(axis=1))
+        """Which robots still have finite states, none huge (MuJoCo's limit), shape (n,)."""
+        return np.asarray((np.abs(self._state[:, 0]) < mujoco.mjMAXVAL).all(axis=1))
 
     def freeze(self, rows: IntArray) -> None:
         """Put robots that left the finite numbers back to rest, so that the others go on."""

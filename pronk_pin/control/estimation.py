@@ -31,16 +31,19 @@ class SpeedEstimator:
 
     def update(self, rows: IntArray, log: PhaseLog) -> Array:
         """Take in a stance that some robots have just finished; their new estimates [m/s]."""
-        n, ticks = log.joints.shape[:2]
+        n, ticks = len(rows), int(log.length.max())
         # The base is level: locked here, and an attitude estimate's business elsewhere.
-        q = self._robot.q_from_base(np.zeros((n, ticks, 3)), log.joints)
-        v = np.concatenate([np.zeros((n, ticks, 6)), log.joint_rates], axis=-1)
+        q = self._robot.q_from_base(np.zeros((n, ticks, 3)), log.joints[:, :ticks])
+        v = np.concatenate([np.zeros((n, ticks, 6)), log.joint_rates[:, :ticks]], axis=-1)
         velocity = leg_odometry(
             self._robot, q.reshape(n * ticks, -1), v.reshape(n * ticks, -1), contact="rolling"
         )
+        # Ticks before the first measured one hold the phase before.
+        measured = np.arange(ticks) >= log.begin[:, None]
+        start = self.speed[rows]
         filtered = first_order(
-            velocity[:, 0].reshape(n, ticks),
-            self.speed[rows],
+            np.where(measured, velocity[:, 0].reshape(n, ticks), start[:, None]),
+            start,
             time_constant=self._time_constant,
             timestep=self._timestep,
         )

@@ -9,6 +9,7 @@ from scipy import signal
 
 from .._typing import Array
 from ..errors import InvalidInput
+from .record import resample
 
 PAPER_B = (0.003, 0.009, 0.009, 0.003)
 PAPER_A = (1.00, -2.37, 1.93, -0.53)
@@ -59,9 +60,6 @@ def first_order(values: Array, start: Array, *, time_constant: float, timestep: 
 
 def look_ahead(values: Array, delta: float) -> Array:
     """Values (n, samples, ...) on the phase grid, read at s + delta, held beyond the end."""
-    samples = values.shape[1]
+    n, samples = values.shape[:2]
     index = np.arange(samples) + delta * (samples - 1)
-    lower = np.minimum(index.astype(np.intp), samples - 1)
-    upper = np.minimum(lower + 1, samples - 1)
-    weight = (index - np.floor(index)).reshape(-1, *[1] * (values.ndim - 2))
-    return np.asarray((1.0 - weight) * values[:, lower] + weight * values[:, upper])
+    return resample(values, np.broadcast_to(index, (n, samples)))

@@ -1,0 +1,170 @@
+"""The tables people read, computed from the summary."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pandas as pd
+
+from ..robot import JOINTS
+from .metrics import reduction
+from .paper import table_1
+
+SHOWN = ("calf", "thigh")
+"""Joints of the paper's Table I."""
+
+_QUANTITIES = ("PD", "ILC", "reduction")
+
+
+def beside_the_paper(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") -> pd.DataFrame:
+    """Table I: peak stance errors [rad] with PD and with learning, ours beside the paper's.
+
+    Args:
+        summary: The summary of a result that holds PD and the learner.
+        scenario: The world.
+        learner: The learning controller.
+
+    Returns:
+        Rows by speed, and one of means; columns by joint, source ("ours", "paper") and quantity
+        ("PD", "ILC", "reduction").
+    """
+    ours = summary[(summary["metric"] == "peak_error") & (summary["scenario"] == scenario)]
+    ours = ours.replace({"controller": {learner: "ilc"}}) if learner != "ilc" else ours
+    parts = {}
+    for joint in SHOWN:
+        for source, table in (("ours", ours), ("paper", table_1())):
+            rows = table[(table["joint"] == joint) & table["controller"].isin(["pd", "ilc"])]
+            wide = rows.pivot_table(index="speed", columns="controller", values="value")
+            for controller in ("pd", "ilc"):
+                if controller in wide:
+                    parts[joint, source, controller.upper()] = wide[controller]
+    table = pd.DataFrame(parts)
+    measured = [name for name in table.columns if name[1] == "ours"]
+    table = table.dropna(subset=measured, how="all")
+    table.loc["mean"] = table.mean()
+    for joint in SHOWN:
+        for source in ("ours", "paper"):
+            if (joint, source, "PD") in table and (joint, source, "ILC") in table:
+                ratio = table[joint, source, "ILC"] / table[joint, source, "PD"]
+                table[joint, source, "reduction"] = 1.0 - ratio
+    order = itertools.product(SHOWN, ("ours", "paper"), _QUANTITIES)
+    return table[[name for name in order if name in table]].rename_axis("speed")
+
+
+def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
+    """One row a controller: means over the speeds and seeds, in the order of the calf's error.
+
+    Columns: `calf`, `thigh` (mean peak [rad]), `calf_reduction`, `thigh_reduction` (of the mean
+    peak against PD's), `calf_rms`, `thigh_rms` [rad], `strides` (to converge, the slowest speed),
+    `feedback` (its share of the torque), `speed_error` [m/s], `apex_error` [m] (mean magnitudes),
+    `upright` (robots that stayed up) and `robots`.
+    """
+    mine = summary[summary["scenario"] == scenario]
+    rows = {}
+    for controller, part in mine.groupby("controller"):
+        value = part.set_index(["metric", "joint"])["value"].sort_index()
+
+        def mean(
+            metric: str, joint: str = "-", values: pd.Series[float] = value, size: bool = False
+        ) -> float:
+            found = values.loc[(metric, joint)]
+            return float((found.abs() if size else found).mean())
+
+        strides = part[(part["metric"] == "strides_to_converge") & (part["joint"] == "-")]["value"]
+        upright = part[part["metric"] == "upright"]["value"]
+        rows[controller] = {
+            **{joint: mean("peak_error", joint) for joint in SHOWN},
+            **{f"{joint}_rms": mean("rms_error", joint) for joint in SHOWN},
+            "strides": float(strides.max()) if len(strides) else float("nan"),
+            "feedback": mean("feedback_share"),
+            "speed_error": mean("speed_error", size=True),
+            "apex_error": mean("apex_error", size=True),
+            "upright": int(upright.sum()),
+            "robots": len(upright),
+        }
+    table = pd.DataFrame(rows).T.rename_axis("controller")
+    if "pd" in table.index:
+        for joint in SHOWN:
+            table[f"{joint}_reduction"] = 1.0 - table[joint] / table.loc["pd", joint]
+    return table.sort_values("calf", ascending=False)
+
+
+def worst_reduction(summary: pd.DataFrame, *, scenario: str, controller: str) -> dict[str, float]:
+    """Smallest reduction of the peak error over the speeds, by joint; negative is worse than PD."""
+    peaks = reduction(summary, "peak_error")
+    mine = peaks[(peaks["scenario"] == scenario) & (peaks["controller"] == controller)]
+    return {joint: float(mine[mine["joint"] == joint]["value"].min()) for joint in JOINTS}
+
+
+def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
+    """The answer in words, computed from the numbers; empty without PD and a learner."""
+    table = overview(summary, scenario=scenario)
+    if not {"pd", "ilc"} <= set(table.index):
+        return ""
+    practice = table.loc["ilc"]
+    sentences = [
+        f"Practice cuts the mean peak error by {practice['calf_reduction']:.0%} in the calf and "
+        f"{practice['thigh_reduction']:.0%} in the thigh against PD"
+        + (
+            f", within {practice['strides']:.0f} strides at every speed."
+            if np.isfinite(practice["strides"])
+            else "; at some speed it has not settled."
+        )
+    ]
+    if "model" in table.index:
+        model = table.loc["model"]
+        wins = [joint for joint in SHOWN if practice[joint] < model[joint]]
+        answer = {2: "beats", 1: f"beats in the {wins[0] if wins else ''} only", 0: "does not beat"}
+        sentences.append(
+            f"It {answer[len(wins)]} the model's feedforward ({practice['calf']:.3f} against "
+            f"{model['calf']:.3f} rad in the calf, {practice['thigh']:.3f} against "
+            f"{model['thigh']:.3f} rad in the thigh)."
+        )
+    fallen = int((table["robots"] - table["upright"]).sum())
+    sentences.append("No robot fell." if fallen == 0 else f"{fallen} robots fell.")
+    return " ".join(sentences)
+
+
+def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
+    """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
+    parts = [
+        _format_beside(beside_the_paper(summary, scenario=scenario)),
+        _format_overview(overview(summary, scenario=scenario)),
+        verdict(summary, scenario=scenario),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _format_beside(table: pd.DataFrame) -> str:
+    lines = [
+        " " * 8 + "".join(f"{f'{joint}: peak stance error [rad]':^44}" for joint in SHOWN),
+        f"{'speed':>6}  " + f"{'this run':^22}{'paper, Table I':^22}" * len(SHOWN),
+        f"{'[m/s]':>6}" + f"{'PD':>8}{'ILC':>7}{'less':>7}" * 2 * len(SHOWN),
+    ]
+    for speed, row in table.iterrows():
+        cells = ""
+        for joint, source in itertools.product(SHOWN, ("ours", "paper")):
+            pd_, ilc, less = (row.get((joint, source, name), np.nan) for name in _QUANTITIES)
+            cells += f"{_number(pd_, '.3f'):>8}{_number(ilc, '.3f'):>7}{_number(less, '.0%'):>7}"
+        lines.append(f"{speed if isinstance(speed, str) else f'{speed:.2g}':>6}{cells}")
+    return "\n".join(lines)
+
+
+def _format_overview(table: pd.DataFrame) -> str:
+    lines = [
+        f"{'':>10}  {'peak [rad]':^15}  {'RMS [rad]':^15}  strides to  feedback's  stayed",
+        f"{'controller':>10}  {'calf':>7} {'thigh':>7}  {'calf':>7} {'thigh':>7}  "
+        f"{'converge':>10}  {'share':>10}  upright",
+    ]
+    for name, row in table.iterrows():
+        lines.append(
+            f"{name:>10}  {row['calf']:7.4f} {row['thigh']:7.4f}  {row['calf_rms']:7.4f} "
+            f"{row['thigh_rms']:7.4f}  {_number(row['strides'], '.0f'):>10}  "
+            f"{row['feedback']:>10.0%}  {row['upright']:.0f} of {row['robots']:.0f}"
+        )
+    return "\n".join(lines)
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if np.isfinite(value) else "-"
