@@ -32,6 +32,7 @@ from .robot import NB, Robot
 
 __all__ = [
     "Baumgarte",
+    "Contact",
     "Impact",
     "StanceDae",
     "StanceDynamics",

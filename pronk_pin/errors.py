@@ -72,6 +72,13 @@ class FileProblem(PronkError):
         super().__init__(f"{path}: {problem}; {remedy}")
 
 
+def cannot_write(
+    path: Path | str, error: OSError, remedy: str = "choose another place, or make room"
+) -> FileProblem:
+    """The `FileProblem` of a file or folder that the system refuses to write."""
+    return FileProblem(path, f"cannot be written ({error.strerror or error})", remedy)
+
+
 class GaitNotFound(PronkError):
     """The gait optimisation did not find a solution.
 

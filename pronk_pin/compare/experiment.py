@@ -37,8 +37,8 @@ class Experiment:
     Attributes:
         robot: Short name of the robot.
         speeds: Desired speeds [m/s].
-        controllers: Short names of the controllers.
-        scenarios: Short names of the worlds.
+        controllers: Short names of the controllers: pd, ilc, model, library, model+ilc, ilc-paper.
+        scenarios: Short names of the worlds: ideal, nominal, payload, weak-motors, soft-ground.
         seeds: Seeds of the scatter at the start.
         base: How the trunk moves: "locked" to x and z.
         schedule: What happens when.

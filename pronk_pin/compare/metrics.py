@@ -91,7 +91,7 @@ def _rows(strides: xr.Dataset, k: int) -> Iterator[dict[str, object]]:
         settled = {joint: strides_to_converge(mine.isel(speed=0), joint) for joint in JOINTS[1:]}
         for joint, count in settled.items():
             yield row("strides_to_converge", count, "1", joint)
-        yield row("strides_to_converge", max(settled.values()), "1")
+        yield row("strides_to_converge", np.max(list(settled.values())), "1")
 
 
 def feedback_share(strides: xr.Dataset) -> float:

@@ -28,7 +28,7 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
-from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, UnknownName
+from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, UnknownName, cannot_write
 from .experiment import Cell, Experiment
 from .metrics import COLUMNS, KEYS, summarize
 from .simulate import Schedule
@@ -70,10 +70,7 @@ class Results:
         try:
             (folder / "strides").mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            reason = error.strerror or str(error)
-            raise FileProblem(
-                folder, f"cannot be written ({reason})", "choose a folder of yours with --folder"
-            ) from error
+            raise cannot_write(folder, error, "choose a folder of yours with --folder") from error
         if not taken:
             results.write_config({"finished": False})
         return results
@@ -226,5 +223,4 @@ def _write(path: Path, text: str) -> None:
         partial.write_text(text)
         partial.replace(path)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise FileProblem(path, f"cannot be written ({reason})", "choose another folder") from error
+        raise cannot_write(path, error, "choose another folder") from error

@@ -55,7 +55,7 @@ def run_experiment(
         mininterval=0.5 if sys.stderr.isatty() else 10.0,
         disable=not progress or not cells,
     ) as bar:
-        if workers == 1 or len(cells) == 1:
+        if workers == 1 or len(cells) <= 1:
             for cell in cells:
                 _simulate(results, cell, lambda steps: bar.update(steps * robots))
         else:

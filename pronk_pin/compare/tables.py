@@ -76,7 +76,7 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
         rows[controller] = {
             **{joint: mean("peak_error", joint) for joint in SHOWN},
             **{f"{joint}_rms": mean("rms_error", joint) for joint in SHOWN},
-            "strides": float(strides.max()) if len(strides) else float("nan"),
+            "strides": float(strides.max(skipna=False)) if len(strides) else float("nan"),
             "feedback": mean("feedback_share"),
             "speed_error": mean("speed_error", size=True),
             "apex_error": mean("apex_error", size=True),

@@ -216,6 +216,11 @@ class World:
         self.force = -self._sensors[:, 0][:, self._force]  # the sensor has the floor's side of it
 
     @property
+    def state(self) -> Array:
+        """MuJoCo's full physics state of each robot, a copy, shape (n, nstate)."""
+        return self._state[:, 0].copy()
+
+    @property
     def finite(self) -> BoolArray:
         """Which robots still have finite states, none huge (MuJoCo's limit), shape (n,)."""
         return np.asarray((np.abs(self._state[:, 0]) < mujoco.mjMAXVAL).all(axis=1))

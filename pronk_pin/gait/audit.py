@@ -13,12 +13,14 @@ import numpy as np
 import pinocchio as pin
 
 from .._typing import Array
+from ..dynamics import contact_jacobian
+from ..kinematics import foot_positions
 from ..robot import NB, Robot
 from . import bezier
 from .collocation import UNITS
 from .gait import Motion
 from .optimize import TOLERANCE, GaitSolution
-from .reintegration import contact_terms, drift, feet_positions, guided_rows
+from .reintegration import drift, guided_rows
 
 CHECKS: Mapping[str, tuple[str, float | None]] = {
     "18-DoF residual": ("N or N m", 1e-8),
@@ -160,7 +162,7 @@ def _worst(name: str, by_phase: Mapping[str, tuple[Motion, Array]]) -> Check:
 
 def _residual(solution: GaitSolution) -> Check:
     """Equations of motion (2) of the whole robot in the rows that the guide leaves free."""
-    robot, lever = solution.problem.robot, solution.model.lever
+    robot, contact = solution.problem.robot, solution.problem.contact
     rows, by_phase = guided_rows(robot), {}
     for name, motion in solution.motions.items():
         residuals = []
@@ -168,7 +170,7 @@ def _residual(solution: GaitSolution) -> Check:
             motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True
         ):
             force = pin.rnea(robot.model, robot.data, q, v, a).copy()
-            force -= contact_terms(robot, q, v, lever).jacobian.T @ lam.ravel()
+            force -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
             force[NB:] -= tau
             residuals.append(force[rows])
         by_phase[name] = (motion, np.array(residuals))
@@ -200,7 +202,7 @@ def _contact_drift(solution: GaitSolution) -> tuple[Check, Check]:
     robot, motion = solution.problem.robot, solution.motions["stance"]
     height = _feet(robot, motion)[..., 2] - robot.foot_radius
     slip = [
-        contact_terms(robot, q, v, solution.model.lever).jacobian @ v
+        contact_jacobian(robot, q, contact=solution.problem.contact) @ v
         for q, v in zip(motion.q, motion.v, strict=True)
     ]
     return (
@@ -211,9 +213,9 @@ def _contact_drift(solution: GaitSolution) -> tuple[Check, Check]:
 
 def _reintegration(solution: GaitSolution) -> tuple[Check, ...]:
     """Stance and flight under the optimised torques, by an adaptive integrator."""
-    robot, lever = solution.problem.robot, solution.model.lever
-    stance = drift(robot, solution.motions["stance"], lever=lever)
-    flight = drift(robot, solution.motions["flight"], lever=None)
+    robot, contact = solution.problem.robot, solution.problem.contact
+    stance = drift(robot, solution.motions["stance"], contact=contact)
+    flight = drift(robot, solution.motions["flight"], contact=None)
     return (
         _check("stance drift", stance.joints, "stance"),
         _check("stance foot drift", stance.feet, "stance"),
@@ -260,4 +262,4 @@ def _use(solution: GaitSolution) -> tuple[Check, ...]:
 
 def _feet(robot: Robot, motion: Motion) -> Array:
     """Centres of the feet at the nodes [m], shape (nodes, 4, 3)."""
-    return np.array([feet_positions(robot, q) for q in motion.q])
+    return np.array([foot_positions(robot, q) for q in motion.q])

@@ -17,18 +17,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
 
 import casadi as ca
 import numpy as np
 
 from .._typing import Array, BoolArray, IntArray
+from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..robot import JOINTS, Robot
 from .newton_euler import NB, FrameMotion, newton_euler
-
-Contact = Literal["rolling", "point"]
-"""How a foot stands: a sphere that rolls without slip, or a point at the sphere's centre."""
 
 _MIRROR = {"L": "R", "R": "L"}
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .._typing import Array
-from ..errors import FileProblem, InvalidInput, SpeedOutOfRange
+from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
 from .gait import ARRAYS, Gait, GaitPhase
 
 SCHEMA = 1
@@ -95,8 +95,7 @@ class GaitLibrary:
             with path.open("wb") as file:
                 np.savez_compressed(file, **arrays)
         except OSError as error:
-            reason = error.strerror or str(error)
-            raise FileProblem(path, f"cannot be written ({reason})", "choose another") from error
+            raise cannot_write(path, error, "choose another") from error
         return path
 
     @classmethod

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..robot import Robot
-from .folded_model import Contact
 
 
 @dataclass(frozen=True)

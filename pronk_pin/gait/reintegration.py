@@ -17,19 +17,12 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 from .._typing import Array
+from ..dynamics import Contact, contact_bias, contact_jacobian
+from ..kinematics import foot_positions
 from ..robot import NB, Robot
 from .gait import Motion
 
 _TOLERANCE = 1e-10
-
-
-class ContactTerms(NamedTuple):
-    """What keeps the feet from slipping: J v = 0 and J a + bias = 0; eq. (3)."""
-
-    jacobian: Array
-    """Of the feet's contact velocities in the world frame, shape (12, 18)."""
-    bias: Array
-    """Contact accelerations at a = 0 [m/s^2], shape (12,)."""
 
 
 class Drift(NamedTuple):
@@ -49,30 +42,8 @@ def guided_rows(robot: Robot) -> Array:
     return np.array([0, 2, *range(NB, robot.nv)])
 
 
-def contact_terms(robot: Robot, q: Array, v: Array, lever: Array) -> ContactTerms:
-    """Contact terms of all feet by Pinocchio.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (19,).
-        v: Velocity, shape (18,).
-        lever: From a foot's centre to where it touches the ground, in the world [m], shape (3,).
-    """
-    model, data, axes = robot.model, robot.data, pin.LOCAL_WORLD_ALIGNED
-    pin.computeJointJacobians(model, data, q)
-    pin.forwardKinematics(model, data, q, v, np.zeros(robot.nv))
-    pin.updateFramePlacements(model, data)
-    jacobian, bias = [], []
-    for foot in robot.foot_ids:
-        full = pin.getFrameJacobian(model, data, foot, axes)  # (6, 18)
-        rate = pin.getFrameClassicalAcceleration(model, data, foot, axes)
-        jacobian.append(full[:3] - pin.skew(lever) @ full[3:])
-        bias.append(rate.linear + np.cross(rate.angular, lever))
-    return ContactTerms(np.concatenate(jacobian), np.concatenate(bias))
-
-
 def forward_dynamics(
-    robot: Robot, q: Array, v: Array, tau: Array, *, lever: Array | None = None
+    robot: Robot, q: Array, v: Array, tau: Array, *, contact: Contact | None = None
 ) -> Array:
     """Acceleration of the guided robot, all feet standing or none: eq. (5) or (2).
 
@@ -81,7 +52,7 @@ def forward_dynamics(
         q: Configuration, shape (19,).
         v: Velocity, shape (18,).
         tau: Motor torques [N m], shape (12,).
-        lever: From a standing foot's centre to the ground [m], shape (3,); None in flight.
+        contact: How all the feet stand on the ground; None in flight.
 
     Returns:
         Acceleration, shape (18,), zero where the guide holds the trunk.
@@ -91,24 +62,24 @@ def forward_dynamics(
     force = np.concatenate([np.zeros(NB), tau])
     force = (force - pin.nonLinearEffects(robot.model, robot.data, q, v))[rows]
     a = np.zeros(robot.nv)
-    if lever is None:
+    if contact is None:
         a[rows] = np.linalg.solve(mass, force)
         return a
-    contact = contact_terms(robot, q, v, lever)
-    jacobian = contact.jacobian[:, rows]  # (12, 14)
+    jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]  # (12, 14)
+    bias = contact_bias(robot, q, v, contact=contact)
     corner = np.zeros((len(jacobian), len(jacobian)))
     kkt = np.block([[mass, -jacobian.T], [jacobian, corner]])
-    a[rows] = np.linalg.solve(kkt, np.concatenate([force, -contact.bias]))[: len(rows)]
+    a[rows] = np.linalg.solve(kkt, np.concatenate([force, -bias]))[: len(rows)]
     return a
 
 
-def drift(robot: Robot, motion: Motion, *, lever: Array | None) -> Drift:
+def drift(robot: Robot, motion: Motion, *, contact: Contact | None) -> Drift:
     """Re-integrate a phase under its optimised torques and compare at every mesh point.
 
     Args:
         robot: The robot.
         motion: The optimised motion at its nodes, midpoints included.
-        lever: From a standing foot's centre to the ground [m], shape (3,); None in flight.
+        contact: How all the feet stand on the ground; None in flight.
     """
     rows = guided_rows(robot)
     n = len(rows)
@@ -122,7 +93,7 @@ def drift(robot: Robot, motion: Motion, *, lever: Array | None) -> Drift:
             v = np.zeros(robot.nv)
             v[rows] = y[n:]
             tau = _quadratic(t, times, torques)
-            a = forward_dynamics(robot, _configuration(robot, y[:n]), v, tau, lever=lever)
+            a = forward_dynamics(robot, _configuration(robot, y[:n]), v, tau, contact=contact)
             return np.concatenate([y[n:], a[rows]])
 
         result = solve_ivp(
@@ -131,17 +102,11 @@ def drift(robot: Robot, motion: Motion, *, lever: Array | None) -> Drift:
         state = np.asarray(result.y[:, -1])
         reached, wanted = state[:n], position[k + 2]
         joints = max(joints, float(np.max(np.abs(reached - wanted)[2:])))
-        apart = feet_positions(robot, _configuration(robot, reached)) - feet_positions(
+        apart = foot_positions(robot, _configuration(robot, reached)) - foot_positions(
             robot, _configuration(robot, wanted)
         )
         feet = max(feet, float(np.max(np.linalg.norm(apart, axis=-1))))
     return Drift(joints, feet)
-
-
-def feet_positions(robot: Robot, q: Array) -> Array:
-    """Centres of the feet in the world [m], shape (4, 3)."""
-    pin.framesForwardKinematics(robot.model, robot.data, q)
-    return np.array([robot.data.oMf[foot].translation for foot in robot.foot_ids])
 
 
 def _configuration(robot: Robot, y: Array) -> Array:

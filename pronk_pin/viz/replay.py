@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from string import Template
 
-from ..errors import FileProblem, InvalidInput
+from ..errors import InvalidInput, cannot_write
 from . import drawing
 from .scene import Scene
 
@@ -54,8 +54,7 @@ def write_replay(scene: Scene, path: Path | str, *, fps: float = 60.0) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(html, encoding="utf-8")
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise FileProblem(path, f"cannot be written ({reason})", "choose another path") from error
+        raise cannot_write(path, error, "choose another path") from error
     return path
 
 

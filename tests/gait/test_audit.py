@@ -5,12 +5,10 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from pronk_pin.gait import Audit, GaitProblem, GaitSolution, audit, optimize_gait
-from pronk_pin.gait.reintegration import contact_terms, drift, forward_dynamics
-from pronk_pin.robot import Robot
+from pronk_pin.gait.reintegration import drift, forward_dynamics
 
 
 @pytest.fixture(scope="module")
@@ -40,29 +38,16 @@ def test_library_keeps_every_value(report: Audit) -> None:
 
 def test_dynamics_give_the_optimised_acceleration(solution: GaitSolution) -> None:
     robot = solution.problem.robot
-    for name, lever in (("stance", solution.model.lever), ("flight", None)):
+    for name, contact in (("stance", solution.problem.contact), ("flight", None)):
         motion = solution.motions[name]
         for k in (0, 7, 24):
-            a = forward_dynamics(robot, motion.q[k], motion.v[k], motion.tau[k], lever=lever)
+            a = forward_dynamics(robot, motion.q[k], motion.v[k], motion.tau[k], contact=contact)
             np.testing.assert_allclose(a, motion.a[k], atol=1e-6)
 
 
-def test_contact_terms_equal_finite_differences(robot: Robot) -> None:
-    rng = np.random.default_rng(3)
-    q = pin.integrate(robot.model, robot.standing, 0.3 * rng.normal(size=robot.nv))
-    v, lever, h = rng.normal(size=robot.nv), np.array([0.0, 0.0, -robot.foot_radius]), 1e-6
-    terms = contact_terms(robot, q, v, lever)
-
-    def velocity(t: float) -> np.ndarray:
-        there = pin.integrate(robot.model, q, v * t)
-        return contact_terms(robot, there, v, lever).jacobian @ v
-
-    np.testing.assert_allclose(terms.bias, (velocity(h) - velocity(-h)) / (2 * h), atol=1e-7)
-
-
 def test_drift_falls_with_the_fourth_power_of_the_mesh(solution: GaitSolution) -> None:
-    robot, lever = solution.problem.robot, solution.model.lever
+    robot, contact = solution.problem.robot, solution.problem.contact
     coarse = optimize_gait(GaitProblem(robot, 0.3, intervals=(6, 8)))
-    drifts = [drift(robot, s.motions["stance"], lever=lever).joints for s in (coarse, solution)]
+    drifts = [drift(robot, s.motions["stance"], contact=contact).joints for s in (coarse, solution)]
     order = np.log2(drifts[0] / drifts[1])  # the mesh is twice as fine
     assert 3.0 < order < 5.5

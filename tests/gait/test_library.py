@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pronk_pin.dynamics import contact_jacobian
 from pronk_pin.errors import FileProblem, InvalidInput, SpeedOutOfRange
 from pronk_pin.gait import (
     SPEEDS,
@@ -20,7 +21,8 @@ from pronk_pin.gait import (
     describe_library,
     load_library,
 )
-from pronk_pin.gait.reintegration import contact_terms, feet_positions, guided_rows
+from pronk_pin.gait.reintegration import guided_rows
+from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot
 
 S = np.linspace(0.0, 1.0, 101)
@@ -74,8 +76,8 @@ def test_motion_is_periodic_and_smooth_at_lift_off(gait: Gait) -> None:
 def test_touchdown_stops_the_feet_by_a_plastic_impact(gait: Gait, robot: Robot) -> None:
     before, after = gait.flight.motion(robot, ENDS), gait.stance.motion(robot, ENDS)
     rows, q, v = guided_rows(robot), after.q[0], before.v[1]
-    lever = np.array([0.0, 0.0, -robot.foot_radius])
-    jacobian = contact_terms(robot, q, v, lever).jacobian[:, rows]
+    contact = "rolling"
+    jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
     np.testing.assert_allclose(jacobian @ after.v[0, rows], 0.0, atol=1e-8)
     # Only impulses at the feet change the velocity, and the ground does not pull.
     jump = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)] @ (after.v[0] - v)[rows]
@@ -92,8 +94,8 @@ def test_standing_feet_push_within_the_friction_cone(gait: Gait, robot: Robot) -
 
 
 def test_feet_stand_on_the_ground_and_fly_above_it(gait: Gait, robot: Robot) -> None:
-    standing = [feet_positions(robot, q)[:, 2] for q in gait.stance.motion(robot, S).q]
-    flying = [feet_positions(robot, q)[:, 2] for q in gait.flight.motion(robot, S).q]
+    standing = [foot_positions(robot, q)[:, 2] for q in gait.stance.motion(robot, S).q]
+    flying = [foot_positions(robot, q)[:, 2] for q in gait.flight.motion(robot, S).q]
     np.testing.assert_allclose(standing, robot.foot_radius, atol=1e-5)
     assert np.min(flying) > robot.foot_radius - 2e-4  # the Bezier form, right at the ends
     assert np.min(flying[50]) > robot.foot_radius + 0.03
@@ -117,11 +119,11 @@ def test_both_sides_mirror_each_other(gait: Gait) -> None:
 
 def test_bezier_form_obeys_the_equations_of_motion(gait: Gait, robot: Robot) -> None:
     """Within what the fits lose; the audit knows the optimised motion to 1e-10."""
-    lever, rows = np.array([0.0, 0.0, -robot.foot_radius]), guided_rows(robot)
+    contact, rows = "rolling", guided_rows(robot)
     motion = gait.stance.motion(robot, S)
     for q, v, a, tau, lam in zip(motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True):
         force = pin.rnea(robot.model, robot.data, q, v, a).copy()
-        force -= contact_terms(robot, q, v, lever).jacobian.T @ lam.ravel()
+        force -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
         force[6:] -= tau
         assert np.max(np.abs(force[rows])) < 1.0
 

@@ -8,10 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pronk_pin.dynamics import contact_jacobian
 from pronk_pin.errors import GaitNotFound, InvalidInput
 from pronk_pin.gait import GaitLibrary, GaitProblem, GaitSolution, optimize_gait
 from pronk_pin.gait.optimize import TOLERANCE
-from pronk_pin.gait.reintegration import contact_terms, feet_positions, guided_rows
+from pronk_pin.gait.reintegration import guided_rows
+from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot
 
 COARSE = (4, 6)
@@ -37,11 +39,11 @@ def test_neighbour_gives_a_quick_start(solution: GaitSolution, library: GaitLibr
 
 
 def test_touchdown_is_the_plastic_impact_of_the_whole_robot(solution: GaitSolution) -> None:
-    robot, lever = solution.problem.robot, solution.model.lever
+    robot, contact = solution.problem.robot, solution.problem.contact
     before, after = solution.motions["flight"], solution.motions["stance"]
     rows, q, v = guided_rows(robot), after.q[0], before.v[-1]
     mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]
-    jacobian = contact_terms(robot, q, v, lever).jacobian[:, rows]
+    jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
     kkt = np.block([[mass, -jacobian.T], [jacobian, np.zeros((12, 12))]])
     solved = np.linalg.solve(kkt, np.concatenate([mass @ v[rows], np.zeros(12)]))
     np.testing.assert_allclose(after.v[0, rows], solved[: len(rows)], atol=1e-8)
@@ -79,7 +81,7 @@ def test_spherical_feet_roll_and_point_feet_stay(solution: GaitSolution) -> None
 
     def travel(found: GaitSolution) -> np.ndarray:
         q = found.motions["stance"].q
-        return feet_positions(robot, q[-1]) - feet_positions(robot, q[0])
+        return foot_positions(robot, q[-1]) - foot_positions(robot, q[0])
 
     q = solution.motions["stance"].q
     turned = (q[-1] - q[0])[7:].reshape(4, 3)[:, 1:].sum(axis=1)  # thigh and calf [rad]

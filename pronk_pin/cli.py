@@ -1,0 +1,218 @@
+"""The command line: `pronk-pin compare | gaits | view | report`."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
+
+from .compare import Experiment, Results, default_folder, run_experiment
+from .compare.tables import format_tables
+from .errors import PronkError
+from .gait import (
+    SPEEDS,
+    GaitLibrary,
+    build_library,
+    describe_gait,
+    describe_library,
+    load_library,
+)
+from .robot import load_robot
+from .viz import Scene, gait_scene, serve, write_replay
+from .viz.practice import practice_scene
+from .viz.report import write_figures, write_report
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Run the comparison: simulate, print the table, write report and replay.
+
+    Run it again with the same --folder and it completes what is missing.
+    """
+
+    experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
+    """What to compare."""
+    folder: Path | None = None
+    """Results folder; by default results/<time>-comparison."""
+    workers: int | None = None
+    """Processes; by default one for each core."""
+
+    def run(self) -> None:
+        """Do it."""
+        folder = self.folder or default_folder()
+        results = run_experiment(self.experiment, folder, workers=self.workers)
+        print(f"robot {self.experiment.robot}, base {self.experiment.base}")
+        for scenario in self.experiment.scenarios:
+            print(f"\nscenario {scenario}\n")
+            print(format_tables(results.summary(), scenario=scenario))
+        _write_pages(results)
+
+
+@dataclass(frozen=True)
+class Report:
+    """Write report.html and replay.html of a result again, and print its table."""
+
+    result: Positional[Path]
+    """Results folder."""
+    figures: Path | None = None
+    """Write the figures into this folder too, as SVG."""
+
+    def run(self) -> None:
+        """Do it."""
+        results = Results.load(self.result)
+        for scenario in results.experiment.scenarios:
+            print(format_tables(results.summary(), scenario=scenario))
+        _write_pages(results)
+        if self.figures is not None:
+            for path in write_figures(results, self.figures):
+                print(f"figure   {path}")
+
+
+@dataclass(frozen=True)
+class View:
+    """Show a motion in a live MeshCat page: the robot beside its reference, or a gait."""
+
+    what: Positional[Path | None] = None
+    """Results folder or gait library; by default the shipped gaits."""
+    speed: float | None = None
+    """Which speed [m/s]; by default the one nearest to 0.5."""
+    controller: str | None = None
+    """Which controller of a result; by default ilc."""
+    scenario: str | None = None
+    """Which scenario of a result; by default the first."""
+    robot: str = "a1"
+    """Robot whose shipped gaits are shown."""
+    port: int | None = None
+    """Port of the page; by default a free one."""
+    open: bool = True
+    """Open the page in the browser."""
+    html: Path | None = None
+    """Write the motion to this file instead: it opens offline."""
+    duration: float | None = None
+    """End after so many seconds; by default on Ctrl-C."""
+
+    def run(self) -> None:
+        """Do it."""
+        scene = self._scene()
+        if self.html is not None:
+            print(f"replay  {write_replay(scene, self.html)}")
+            return
+        serve(scene, port=self.port, open_browser=self.open, duration=self.duration)
+
+    def _scene(self) -> Scene:
+        if self.what is not None and self.what.is_dir():
+            return practice_scene(
+                Results.load(self.what),
+                speed=self.speed,
+                controller=self.controller,
+                scenario=self.scenario,
+            )
+        library = _library(self.what, self.robot)
+        return gait_scene(load_robot(library.robot), library.at(_default_speed(self.speed)))
+
+
+@dataclass(frozen=True)
+class Build:
+    """Optimise a gait library anew."""
+
+    robot: str = "a1"
+    """Robot."""
+    speeds: tuple[float, ...] = tuple(float(speed) for speed in SPEEDS)
+    """Speeds [m/s]."""
+    apex: float = 0.34
+    """Greatest height of the trunk [m]."""
+    output: Path = Path("gaits.npz")
+    """File to write."""
+
+    def run(self) -> None:
+        """Do it."""
+        library = build_library(
+            load_robot(self.robot), sorted(self.speeds), apex=self.apex, path=self.output
+        )
+        print(describe_library(library))
+        print(f"\ngaits  {self.output}")
+
+
+@dataclass(frozen=True)
+class Show:
+    """Print the proof of a gait library: violations, residuals, drift, limits."""
+
+    speed: Positional[float | None] = None
+    """One gait in detail [m/s]; by default a line for each."""
+    library: Path | None = None
+    """Library file; by default the shipped one."""
+    robot: str = "a1"
+    """Robot whose shipped library is shown."""
+
+    def run(self) -> None:
+        """Do it."""
+        library = _library(self.library, self.robot)
+        text = (
+            describe_library(library) if self.speed is None else describe_gait(library, self.speed)
+        )
+        print(text)
+
+
+@dataclass(frozen=True)
+class Gaits:
+    """Build or show the gait library."""
+
+    action: Annotated[Build, subcommand("build")] | Annotated[Show, subcommand("show")]
+
+    def run(self) -> None:
+        """Do it."""
+        self.action.run()
+
+
+Command = (
+    Annotated[Compare, subcommand("compare")]
+    | Annotated[Gaits, subcommand("gaits")]
+    | Annotated[View, subcommand("view")]
+    | Annotated[Report, subcommand("report")]
+)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Entry point; the exit code is 0, 1 for an error of ours, 2 for wrong usage, 130 on Ctrl-C."""
+    try:
+        command = tyro.cli(
+            Command,
+            prog="pronk-pin",
+            description="When a legged robot repeats a motion, does practice beat the model?",
+            args=arguments,
+            config=(OmitSubcommandPrefixes,),
+        )
+        command.run()
+    except PronkError as error:
+        print(f"pronk-pin: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("pronk-pin: interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _write_pages(results: Results) -> None:
+    """The report and the replay of a result, with their names printed."""
+    print(f"\nresults  {results.folder}")
+    print(f"report   {write_report(results)}")
+    print(f"replay   {write_replay(practice_scene(results), results.folder / 'replay.html')}")
+
+
+def _library(path: Path | None, robot: str) -> GaitLibrary:
+    if path is None:
+        load_robot(robot)
+        return load_library(robot)
+    return GaitLibrary.load(path)
+
+
+def _default_speed(speed: float | None) -> float:
+    return 0.5 if speed is None else speed
+
+
+if __name__ == "__main__":
+    sys.exit(main())

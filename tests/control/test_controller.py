@@ -1,0 +1,222 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from pronk_pin._typing import Array
+from pronk_pin.control import (
+    CONTROLLERS,
+    SAMPLES,
+    Controller,
+    ControllerSpec,
+    PDTypeILC,
+    PhaseLog,
+    load_controller,
+    phase_grid,
+)
+from pronk_pin.errors import InvalidInput, UnknownName
+from pronk_pin.gait import Gait
+from pronk_pin.kinematics import leg_angle
+from pronk_pin.robot import Robot
+
+DT = 0.001
+BOTH = np.arange(2)
+
+
+@pytest.fixture
+def controller(robot: Robot, gaits: list[Gait]) -> Controller:
+    return Controller(robot, gaits, load_controller("ilc"), timestep=DT)
+
+
+@pytest.fixture
+def stances(gaits: list[Gait], phase_log: Callable[..., PhaseLog]) -> Callable[..., PhaseLog]:
+    """Logs of stances whose joint angles miss the reference by an offset [rad] (2, 1, 12)."""
+
+    def build(offset: Array | float = 0.0) -> PhaseLog:
+        ticks = round(gaits[0].stance.duration / DT)
+        references = [g.stance.joint_reference(_phases(g.stance.duration, ticks)) for g in gaits]
+        joints, joint_rates = (np.stack(part) for part in zip(*references, strict=True))
+        return phase_log(joints - offset, joint_rates, begin=2)
+
+    return build
+
+
+def _phases(duration: float, ticks: int) -> Array:
+    return np.minimum(DT * np.arange(ticks) / duration, 1.0)
+
+
+def test_a_stance_tape_is_the_gaits_reference_at_each_tick(
+    controller: Controller, gaits: list[Gait]
+) -> None:
+    tape = controller.touchdown(BOTH, np.full(2, np.inf))
+    for robot, gait in enumerate(gaits):
+        ticks = tape.length[robot]
+        assert ticks * DT == pytest.approx(gait.stance.duration, abs=DT / 2)
+        position, velocity = gait.stance.joint_reference(_phases(gait.stance.duration, ticks))
+        np.testing.assert_allclose(tape.position[robot, :ticks], position, atol=1e-12)
+        np.testing.assert_allclose(tape.velocity[robot, :ticks], velocity, atol=1e-12)
+
+
+def test_a_stance_begins_as_late_as_the_touchdown_is_felt(controller: Controller) -> None:
+    assert controller.touchdown(BOTH, np.ones(2)).begin == controller.spec.touchdown_ticks == 2
+
+
+def test_a_stance_plays_the_feedforward_it_was_given(robot: Robot, gaits: list[Gait]) -> None:
+    slope = np.random.default_rng(0).normal(size=(2, 1, 12))
+    feedforward = slope * phase_grid()[:, None]
+    controller = Controller(
+        robot, gaits, load_controller("library"), timestep=DT, feedforward=feedforward
+    )
+    tape = controller.touchdown(np.array([1]), np.ones(1))
+    s = _phases(gaits[1].stance.duration, tape.feedforward.shape[1])
+    np.testing.assert_allclose(tape.feedforward[0], slope[1] * s[:, None], atol=1e-12)
+
+
+def test_flight_goes_on_from_stance_and_ends_in_the_posture_of_touchdown(
+    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    tape, _ = controller.liftoff(BOTH, stances())
+    for robot, gait in enumerate(gaits):
+        leaving, _ = gait.stance.joint_reference(np.array([1.0]))
+        np.testing.assert_allclose(tape.position[robot, 0], leaving[0], atol=1e-3)
+        # Nothing moves any more once flight lasts longer than planned.
+        late = round(1.2 * gait.flight.duration / DT)
+        assert late < tape.length[robot]
+        np.testing.assert_array_equal(tape.velocity[robot, late:], 0.0)
+        np.testing.assert_allclose(np.ptp(tape.position[robot, late:], axis=0), 0.0, atol=1e-12)
+
+
+def test_the_flights_velocity_is_the_derivative_of_its_position(
+    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    tape, _ = controller.liftoff(BOTH, stances())
+    planned = round(gaits[0].flight.duration / DT)
+    difference = (tape.position[:, 2:planned] - tape.position[:, : planned - 2]) / (2.0 * DT)
+    np.testing.assert_allclose(tape.velocity[:, 1 : planned - 1], difference, atol=0.05)
+
+
+def test_speed_regulation_turns_the_legs_by_touchdown_and_nothing_else(
+    robot: Robot, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    log = stances()
+    log.joint_rates[..., 1::3] += 1.0  # the legs swing back faster: the trunk is too fast
+    tape, _ = Controller(robot, gaits, ControllerSpec("pd"), timestep=DT).liftoff(BOTH, log)
+    planned = [gait.flight.joint_reference(np.array([0.0, 1.0]))[0] for gait in gaits]
+    begin, end = np.swapaxes(planned, 0, 1)
+
+    np.testing.assert_allclose(tape.position[:, 0], begin, atol=1e-12)
+    turned = leg_angle(tape.position[:, -1]) - leg_angle(end)
+    assert np.all((turned < -0.005) & (turned >= -0.15))
+    np.testing.assert_allclose(tape.position[:, -1, 0::3], end[:, 0::3], atol=1e-12)
+    np.testing.assert_allclose(tape.position[:, -1, 2::3], end[:, 2::3], atol=1e-12)
+    again = Controller(robot, gaits, ControllerSpec("pd"), timestep=DT)
+    stance = again.touchdown(BOTH, np.ones(2)).position[:, 0]
+    unmodified = [gait.stance.joint_reference(np.array([0.0]))[0][0] for gait in gaits]
+    np.testing.assert_allclose(stance, unmodified, atol=1e-12)
+
+
+def test_the_record_holds_reference_minus_measured(
+    controller: Controller, stances: Callable[..., PhaseLog]
+) -> None:
+    offset = np.random.default_rng(0).normal(size=(2, 1, 12))
+    _, record = controller.liftoff(BOTH, stances(offset))
+    np.testing.assert_allclose(record.error, np.broadcast_to(offset, (2, SAMPLES, 12)), atol=1e-9)
+    np.testing.assert_allclose(record.error_rate, 0.0, atol=1e-9)
+
+
+def test_a_stride_as_planned_is_learned_from(
+    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    controller.learning = True
+    _, record = controller.liftoff(BOTH, stances(0.1))
+    tape = controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    np.testing.assert_allclose(controller.feedforward, PDTypeILC().update(record))
+    # 0.1 rad too little everywhere asks for half of Kp * 0.1.
+    np.testing.assert_allclose(tape.feedforward[:, 80], 0.05 * np.tile([35, 60, 90], (2, 4)))
+
+
+def test_nothing_is_learned_from_strides_that_are_too_short_or_too_long(
+    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    controller.learning = True
+    controller.liftoff(BOTH, stances(0.1))
+    controller.touchdown(BOTH, np.array([0.5, 1.5]) * gaits[0].duration)
+    np.testing.assert_array_equal(controller.feedforward, 0.0)
+
+
+def test_each_robot_learns_from_its_own_strides_only(
+    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    controller.learning = True
+    controller.liftoff(BOTH, stances(0.1))
+    controller.touchdown(np.array([1]), np.array([gaits[1].duration]))
+    assert np.all(controller.feedforward[0] == 0.0)
+    assert np.all(controller.feedforward[1] > 0.0)
+
+
+def test_nothing_is_learned_before_the_first_stride(
+    controller: Controller, gaits: list[Gait]
+) -> None:
+    controller.learning = True
+    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    np.testing.assert_array_equal(controller.feedforward, 0.0)
+
+
+@pytest.mark.parametrize(("name", "learning"), [("ilc", False), ("pd", True), ("library", True)])
+def test_nothing_is_learned_without_a_law_or_with_the_law_off(
+    robot: Robot, gaits: list[Gait], stances: Callable[..., PhaseLog], name: str, learning: bool
+) -> None:
+    controller = Controller(robot, gaits, load_controller(name), timestep=DT)
+    controller.learning = learning
+    controller.liftoff(BOTH, stances(0.1))
+    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    np.testing.assert_array_equal(controller.feedforward, 0.0)
+
+
+def test_what_was_handed_in_is_not_changed_by_learning(
+    robot: Robot, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    given = np.zeros((2, SAMPLES, 12))
+    spec = load_controller("model+ilc")
+    controller = Controller(robot, gaits, spec, timestep=DT, feedforward=given)
+    controller.learning = True
+    controller.liftoff(BOTH, stances(0.1))
+    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    assert np.any(controller.feedforward != 0.0)
+    assert np.all(given == 0.0)
+
+
+def test_standing_holds_the_posture_in_which_stance_begins(
+    controller: Controller, gaits: list[Gait]
+) -> None:
+    tape = controller.stand(3)
+    start = [gait.stance.joint_reference(np.array([0.0]))[0][0] for gait in gaits]
+    np.testing.assert_allclose(tape.position, np.repeat(np.array(start)[:, None], 3, axis=1))
+    assert not tape.velocity.any()
+    assert not tape.feedforward.any()
+
+
+def test_a_feedforward_of_the_wrong_shape_is_refused(robot: Robot, gaits: list[Gait]) -> None:
+    with pytest.raises(InvalidInput, match=r"feedforward of shape \(1, 161, 12\); expected \(2,"):
+        Controller(
+            robot, gaits, ControllerSpec("pd"), timestep=DT, feedforward=np.zeros((1, SAMPLES, 12))
+        )
+
+
+def test_an_unknown_controller_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(UnknownName) as caught:
+        load_controller("lqr")
+    assert str(caught.value) == (
+        "unknown controller 'lqr'; choose one of: pd, ilc, model, library, model+ilc, ilc-paper"
+    )
+
+
+def test_an_unknown_source_of_the_feedforward_is_refused() -> None:
+    with pytest.raises(UnknownName, match="unknown feedforward seed 'oracle'"):
+        ControllerSpec("mine", seed="oracle")
+
+
+def test_every_controller_is_known_by_its_own_name() -> None:
+    assert all(name == spec.name for name, spec in CONTROLLERS.items())

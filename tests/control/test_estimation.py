@@ -1,0 +1,97 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pronk_pin._typing import Array
+from pronk_pin.control import PhaseLog
+from pronk_pin.control.estimation import SpeedEstimator
+from pronk_pin.errors import InvalidInput
+from pronk_pin.robot import Robot
+
+DT = 0.001
+
+
+@pytest.fixture
+def rolling(robot: Robot, phase_log: Callable[..., PhaseLog]) -> Callable[..., PhaseLog]:
+    """Logs of stances in which the feet roll on the ground under trunks of given speeds."""
+
+    def rates(speed: float) -> Array:
+        """Joint rates that let each foot's sphere roll, from Pinocchio's Jacobians."""
+        joint_rates = np.zeros(12)
+        for leg, foot in enumerate(robot.foot_ids):
+            jacobian = pin.computeFrameJacobian(
+                robot.model, robot.data, robot.standing, foot, pin.LOCAL_WORLD_ALIGNED
+            )
+            sagittal = jacobian[np.ix_([0, 2], [6 + 3 * leg + 1, 6 + 3 * leg + 2])]
+            # A sphere that turns with the calf about y rolls with r times that rate.
+            sagittal[0] -= robot.foot_radius
+            joint_rates[3 * leg + 1 : 3 * leg + 3] = np.linalg.solve(sagittal, [-speed, 0.0])
+        return joint_rates
+
+    def build(*speeds: float, ticks: int = 160) -> PhaseLog:
+        joint_rates = np.repeat([[rates(speed)] for speed in speeds], ticks, axis=1)
+        joints = np.broadcast_to(robot.standing[7:], joint_rates.shape)
+        return phase_log(joints.copy(), joint_rates)
+
+    return build
+
+
+def test_the_speed_over_rolling_feet_is_exact_without_a_filter(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    estimator = SpeedEstimator(robot, 3, time_constant=0.0, timestep=DT)
+    speed = estimator.update(np.arange(3), rolling(-0.5, 0.0, 0.8))
+    np.testing.assert_allclose(speed, [-0.5, 0.0, 0.8], atol=1e-12)
+
+
+def test_the_estimate_approaches_the_speed_with_the_filters_time_constant(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    estimator = SpeedEstimator(robot, 1, time_constant=0.1, timestep=DT)
+    speed = estimator.update(np.arange(1), rolling(1.0, ticks=100))
+    assert speed[0] == pytest.approx(1.0 - np.exp(-1.0), abs=0.005)
+
+
+def test_the_next_stance_goes_on_from_the_estimate_of_the_last_one(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    twice = SpeedEstimator(robot, 1, time_constant=0.1, timestep=DT)
+    once = SpeedEstimator(robot, 1, time_constant=0.1, timestep=DT)
+    for _ in range(2):
+        twice.update(np.arange(1), rolling(0.6, ticks=80))
+    once.update(np.arange(1), rolling(0.6, ticks=160))
+    np.testing.assert_allclose(twice.speed, once.speed, rtol=1e-12)
+
+
+def test_only_the_measured_ticks_count(robot: Robot, rolling: Callable[..., PhaseLog]) -> None:
+    log = rolling(0.4)
+    spoiled = PhaseLog(
+        log.joints.copy(),
+        log.joint_rates.copy(),
+        log.feedback,
+        log.feedforward,
+        begin=np.array([2]),
+        length=np.array([120]),
+    )
+    spoiled.joint_rates[:, :2] = spoiled.joint_rates[:, 120:] = 15.0
+    estimator = SpeedEstimator(robot, 1, time_constant=0.02, timestep=DT)
+    speed = estimator.update(np.arange(1), spoiled)
+    assert speed[0] == pytest.approx(0.4 * (1.0 - (20.0 / 21.0) ** 118), rel=1e-9)
+
+
+def test_robots_that_are_not_asked_about_keep_their_estimates(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    estimator = SpeedEstimator(robot, 2, time_constant=0.0, timestep=DT)
+    estimator.update(np.arange(2), rolling(0.1, 0.2))
+    estimator.update(np.array([1]), rolling(0.7))
+    np.testing.assert_allclose(estimator.speed, [0.1, 0.7], atol=1e-12)
+
+
+def test_a_negative_time_constant_is_refused(robot: Robot) -> None:
+    with pytest.raises(InvalidInput, match="must not be negative"):
+        SpeedEstimator(robot, 1, time_constant=-0.1, timestep=DT)

@@ -1,0 +1,99 @@
+"""The laws on a quasi-static plant, where each multiplies the error by a number known by hand.
+
+A joint that needs the torque d, and gets `ff + Kp e`, rests at the error `e = (d - ff) / Kp`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pronk_pin._typing import Array
+from pronk_pin.control import (
+    SAMPLES,
+    Gains,
+    LearningLaw,
+    PaperILC,
+    PDTypeILC,
+    StrideRecord,
+    StrideSelection,
+    ZeroPhaseFilter,
+    phase_grid,
+)
+from pronk_pin.errors import InvalidInput
+
+KP = Gains().proportional
+LOAD = 6.0 * np.linspace(-1.0, 1.0, 12)  # [N m]
+SHAPE = (1, SAMPLES, 12)
+
+
+def stride(feedforward: Array) -> StrideRecord:
+    """A stride of the quasi-static plant under a feedforward."""
+    error = (LOAD - feedforward) / KP
+    return StrideRecord(error, np.zeros(SHAPE), KP * error, feedforward, np.ones(1))
+
+
+def practise(law: LearningLaw, strides: int) -> Array:
+    """Errors before each of some strides, over the error without feedforward; shape (strides,)."""
+    record, shares = stride(np.zeros(SHAPE)), []
+    for _ in range(strides):
+        shares.append(record.error[0, SAMPLES // 2, -1] * KP[-1] / LOAD[-1])
+        record = stride(law.update(record))
+    return np.array(shares)
+
+
+@pytest.mark.parametrize("gain", [0.15, 0.5, 1.0, 1.5])
+def test_without_forgetting_each_stride_leaves_one_minus_the_gain_of_the_error(gain: float) -> None:
+    shares = practise(PDTypeILC(gain=gain, leak=0.0), 8)
+    np.testing.assert_allclose(shares, (1.0 - gain) ** np.arange(8), atol=1e-6)
+
+
+def test_forgetting_leaves_the_predicted_error() -> None:
+    gain, leak = 0.3, 0.1
+    shares = practise(PDTypeILC(gain=gain, leak=leak), 60)
+    assert shares[-1] == pytest.approx(leak / (gain + leak), rel=1e-6)
+
+
+def test_the_default_law_keeps_almost_nothing_of_the_error_within_17_strides() -> None:
+    assert practise(PDTypeILC(), 18)[17] < 0.02
+
+
+def test_the_papers_law_with_an_exact_filter_only_turns_the_error_around() -> None:
+    shares = practise(PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1)), 9)
+    np.testing.assert_allclose(shares, (-1.0) ** np.arange(9), atol=1e-5)
+
+
+def test_the_printed_filter_holds_the_papers_law_at_78_percent_reduction() -> None:
+    shares = practise(PaperILC(), 60)
+    assert np.all(np.abs(shares[1:]) < 1.0)
+    # Fixed point of ff <- 0.64 (2 d - ff).
+    assert shares[-1] == pytest.approx(1.0 - 1.28 / 1.64, abs=1e-6)
+
+
+def test_an_error_is_answered_earlier_by_the_look_ahead() -> None:
+    s = phase_grid()
+    bump = np.exp(-(((s - 0.5) / 0.1) ** 2))[None, :, None] * np.ones(12)
+    record = StrideRecord(bump, np.zeros(SHAPE), np.zeros(SHAPE), np.zeros(SHAPE), np.ones(1))
+    peak = s[np.argmax(PDTypeILC(delta=0.1).update(record)[0, :, 0])]
+    assert peak == pytest.approx(0.4, abs=0.01)
+
+
+def test_the_rate_of_the_error_is_weighted_with_the_derivative_gains() -> None:
+    ones, none = np.ones(SHAPE), np.zeros(SHAPE)
+    learned = PDTypeILC(gain=0.5, leak=0.0).update(StrideRecord(none, ones, none, none, np.ones(1)))
+    np.testing.assert_allclose(learned[0, 80], 0.5 * Gains().derivative, rtol=1e-6)
+
+
+@pytest.mark.parametrize("settings", [{"gain": 2.0}, {"leak": 1.1}, {"delta": -0.1}])
+def test_a_law_that_cannot_work_is_refused(settings: dict[str, float]) -> None:
+    with pytest.raises(InvalidInput, match="a PD-type law needs gain in"):
+        PDTypeILC(**settings)
+
+
+def test_only_finite_strides_of_about_the_right_length_are_worth_learning_from() -> None:
+    duration = np.array([0.6, 0.75, 1.0, 1.35, 1.5, np.inf, np.nan, 1.0])
+    error = np.zeros((8, SAMPLES, 12))
+    error[7, 3, 4] = np.nan
+    record = StrideRecord(error, error, error, error, duration)
+    usable = StrideSelection().usable(record)
+    assert usable.tolist() == [False, True, True, True, False, False, False, False]

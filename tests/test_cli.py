@@ -1,0 +1,180 @@
+"""Each command does what its help says, and bad input ends in one line with a remedy."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from pronk_pin.cli import main
+
+SHORT = ["--speeds", "0.0", "0.4", "--schedule.practice", "2", "--schedule.learning", "3"]
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small comparison, run once by the command line."""
+    folder = tmp_path_factory.mktemp("results") / "small"
+    controllers = ["--controllers", "pd", "ilc", "library"]
+    code = main(["compare", *SHORT, *controllers, "--folder", str(folder), "--workers", "1"])
+    assert code == 0
+    return folder
+
+
+def failure(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The error of a command that must fail in one line."""
+    assert main(arguments) == 1
+    error = capsys.readouterr().err.strip()
+    last = error.splitlines()[-1]
+    assert last.startswith("pronk-pin: ")
+    assert "Traceback" not in error
+    return last
+
+
+def test_compare_writes_everything_it_names(result: Path) -> None:
+    names = {path.name for path in result.iterdir()}
+    assert names == {"config.json", "replay.html", "report.html", "strides", "summary.csv"}
+    assert {path.name for path in (result / "strides").iterdir()} == {
+        "pd_nominal_0.nc",
+        "ilc_nominal_0.nc",
+        "library_nominal_0.nc",
+    }
+
+
+def test_summary_is_one_long_sorted_table(result: Path) -> None:
+    summary = pd.read_csv(result / "summary.csv")
+    keys = ["robot", "base", "scenario", "speed", "controller", "seed", "joint", "metric"]
+    assert list(summary.columns) == [*keys, "value", "unit"]
+    assert summary.equals(summary.sort_values(keys, ignore_index=True))
+    assert not summary.duplicated(keys).any()
+    assert set(summary["controller"]) == {"pd", "ilc", "library"}
+    assert set(summary["joint"]) == {"hip", "thigh", "calf", "-"}
+
+
+def test_pages_need_nothing_from_outside(result: Path) -> None:
+    for name in ("report.html", "replay.html"):
+        text = (result / name).read_text()
+        assert not re.search(r"""(src|href)=["'](?!data:|#)""", text), name
+
+
+def test_report_prints_the_table_again(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (result / "report.html").unlink()
+    assert main(["report", str(result)]) == 0
+    output = capsys.readouterr().out
+    assert "paper, Table I" in output
+    assert "Practice cuts the mean peak error by" in output
+    assert (result / "report.html").stat().st_size > 10_000
+
+
+def test_compare_again_takes_what_is_there(
+    result: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = sorted((result / "strides").iterdir())
+    before = [file.stat().st_mtime_ns for file in files]
+    controllers = ["--controllers", "pd", "ilc", "library"]
+    assert main(["compare", *SHORT, *controllers, "--folder", str(result)]) == 0
+    assert [file.stat().st_mtime_ns for file in files] == before
+
+
+def test_view_writes_a_result_or_a_gait_to_a_file(result: Path, tmp_path: Path) -> None:
+    for name, arguments in (
+        ("result", [str(result), "--speed", "0.4", "--controller", "pd"]),
+        ("gait", ["--speed", "-0.25"]),
+    ):
+        path = tmp_path / f"{name}.html"
+        assert main(["view", *arguments, "--html", str(path)]) == 0
+        assert path.stat().st_size < 5_000_000
+
+
+def test_gaits_show_proves_every_gait(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gaits", "show"]) == 0
+    rows = re.findall(r"^ +[+-]\d\.\d\d ", capsys.readouterr().out, flags=re.MULTILINE)
+    assert len(rows) == 14
+    assert main(["gaits", "show", "-0.3"]) == 0
+    assert "friction cone" in capsys.readouterr().out
+
+
+def test_gaits_build_makes_a_library_that_show_reads(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "two.npz"
+    assert main(["gaits", "build", "--speeds", "0.1", "0.2", "--output", str(path)]) == 0
+    assert main(["gaits", "show", "0.2", "--library", str(path)]) == 0
+    assert "18-DoF residual" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["compare", "--controllers", "lqr"], "unknown controller 'lqr'; choose one of: pd, ilc"),
+        (["compare", "--scenarios", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
+        (["compare", "--robot", "spot"], "unknown robot 'spot'; choose one of: a1"),
+        (["compare", "--speeds", "3"], "outside the gait library, which covers -0.5 to 0.8 m/s"),
+        (["compare", "--speeds", "0.1", "0.1"], "speeds must name at least one, and none of them"),
+        (["compare", "--base", "free"], "base 'free' is not available"),
+        (["compare", "--workers", "0"], "at least one is needed"),
+        (["compare", "--schedule.learning", "-1"], "finite and not negative"),
+        (["report", "nowhere"], "not a results folder (no config.json); run 'pronk-pin compare'"),
+        (["view", "nowhere.npz"], "no such gait library; make it again with 'pronk-pin gaits"),
+        (["view", "--speed", "2"], "outside the gait library"),
+        (["view", "--robot", "spot"], "unknown robot 'spot'"),
+        (["gaits", "show", "0.9"], "outside the gait library"),
+        (["gaits", "build", "--robot", "spot"], "unknown robot 'spot'"),
+    ],
+)
+def test_bad_input_gets_one_line_with_the_remedy(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if arguments[:2] == ["compare", "--workers"]:
+        arguments = [*arguments, *SHORT]
+    assert message in failure(arguments, capsys)
+
+
+def test_a_file_in_the_way_of_the_folder_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "file"
+    path.write_text("")
+    message = failure(["compare", *SHORT, "--folder", str(path / "results")], capsys)
+    assert "cannot be written" in message
+    assert "--folder" in message
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04 cut off"])
+def test_a_damaged_gait_library_is_named(
+    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "gaits.npz"
+    path.write_bytes(content)
+    message = failure(["gaits", "show", "--library", str(path)], capsys)
+    assert f"{path}: damaged gait library" in message
+
+
+def test_a_damaged_result_is_named(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = result / "strides" / "ilc_nominal_0.nc"
+    whole = path.read_bytes()
+    try:
+        path.write_bytes(whole[: len(whole) // 2])
+        message = failure(["view", str(result)], capsys)
+        assert "ilc_nominal_0.nc: damaged" in message
+        assert "delete it and run" in message
+        path.unlink()
+        assert "ilc_nominal_0.nc: missing" in failure(["view", str(result)], capsys)
+    finally:
+        path.write_bytes(whole)
+
+
+def test_an_unknown_speed_of_a_result_lists_what_there_is(
+    result: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    message = failure(["view", str(result), "--speed", "0.1"], capsys)
+    assert "choose one of: 0, 0.4" in message
+
+
+def test_wrong_usage_exits_with_2() -> None:
+    for arguments in ([], ["jump"], ["compare", "--speeds", "fast"], ["report"]):
+        with pytest.raises(SystemExit) as exit_:
+            main(arguments)
+        assert exit_.value.code == 2, arguments
