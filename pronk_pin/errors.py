@@ -98,19 +98,18 @@ class GaitNotFound(PronkError):
         )
 
 
-class SimulationDiverged(PronkError):
-    """A simulation left the finite numbers.
+class WorkerLost(PronkError):
+    """A process of a comparison ended in the middle of its work, for want of memory perhaps.
 
     Attributes:
-        step: The step at which it happened.
-        state: The last finite state, for a reproduction.
+        folder: The results folder, which holds what was finished.
     """
 
-    def __init__(self, step: int, state: object) -> None:
-        self.step, self.state = step, state
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         super().__init__(
-            f"the simulation diverged at step {step}; reduce the feedback gains or the "
-            "time step of the scenario"
+            "a worker process ended unexpectedly; run the same command again with "
+            f"'--folder {folder} --workers 1' to complete what is missing"
         )
 
 

@@ -7,7 +7,6 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -106,7 +105,7 @@ class Cell:
     @property
     def practised(self) -> Cell | None:
         """The cell in which the torque library is learned, for a cell that replays it."""
-        if load_controller(self.controller).seed != "library":
+        if load_controller(self.controller).source != "library":
             return None
         return dataclasses.replace(self, controller="ilc")
 
@@ -142,7 +141,7 @@ def run_cell(
         scenario,
         schedule=cell.schedule,
         rng=rng,
-        feedforward=_seed(spec, robot_name=cell.robot, speeds=cell.speeds, practised=practised),
+        feedforward=_feedforward(spec, cell, practised),
     )
     log = simulation.run(progress)
     return to_dataset(log, robot, gaits, attributes=_attributes(cell))
@@ -155,21 +154,15 @@ def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     return TorqueLibrary.from_strides(strides["speed"].to_numpy(), torque.to_numpy())
 
 
-def _seed(
-    spec: ControllerSpec,
-    *,
-    robot_name: str,
-    speeds: Sequence[float],
-    practised: xr.Dataset | None,
-) -> Array | None:
+def _feedforward(spec: ControllerSpec, cell: Cell, practised: xr.Dataset | None) -> Array | None:
     """The feedforward that a controller begins with [N m], shape (n, samples, 12)."""
-    if spec.seed == "model":
-        library = load_library(robot_name)
-        return model_feedforward(load_robot(robot_name), [library.at(v) for v in speeds])
-    if spec.seed == "library":
+    if spec.source == "model":
+        library = load_library(cell.robot)
+        return model_feedforward(load_robot(cell.robot), [library.at(v) for v in cell.speeds])
+    if spec.source == "library":
         if practised is None:
             raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
-        return torque_library(practised).at(np.asarray(speeds))
+        return torque_library(practised).at(np.asarray(cell.speeds))
     return None
 
 

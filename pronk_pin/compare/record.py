@@ -87,6 +87,10 @@ class StrideLog:
         self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
         return np.asarray(duration)
 
+    def finish(self, upright: BoolArray) -> None:
+        """The simulation has ended; a fall in an unfinished stride counts for the last finished."""
+        self.scalars["upright"][np.arange(len(upright)), np.maximum(self.count - 1, 0)] = upright
+
 
 def _on_grid(values: Array, log: PhaseLog) -> Array:
     """Values (m, ticks, ...) over the time that the phase lasted, on the phase grid."""

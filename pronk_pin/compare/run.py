@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import sys
+import threading
 import time
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import connection
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
-from ..errors import InvalidInput
+from ..errors import InvalidInput, WorkerLost
 from .experiment import Cell, Experiment, run_cell
 from .results import Results
 from .simulate import Progress
@@ -39,6 +43,7 @@ def run_experiment(
 
     Raises:
         FileProblem: The folder cannot be written, or holds another experiment.
+        WorkerLost: A process ended in the middle of its work.
     """
     workers = workers if workers is not None else os.cpu_count() or 1
     if workers < 1:
@@ -78,7 +83,7 @@ def _in_processes(results: Results, cells: list[Cell], workers: int, bar: tqdm[A
     counter = context.Value("q", 0)
     waiting, running = list(cells), set[Future[None]]()
     with ProcessPoolExecutor(
-        min(workers, len(cells)), context, initializer=_share, initargs=(counter,)
+        min(workers, len(cells)), context, initializer=_begin_worker, initargs=(counter,)
     ) as pool:
         try:
             while waiting or running:
@@ -89,15 +94,29 @@ def _in_processes(results: Results, cells: list[Cell], workers: int, bar: tqdm[A
                 for future in done:
                     future.result()
                 bar.update(counter.value - bar.n)
+        except BrokenProcessPool as error:
+            raise WorkerLost(results.folder) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()  # what they have not saved is simulated again next time
             raise
     bar.update(counter.value - bar.n)
 
 
-def _share(counter: Synchronized[int]) -> None:
+def _begin_worker(counter: Synchronized[int]) -> None:
+    """Set a worker up: it counts its steps, leaves Ctrl-C to the parent, and dies with it."""
     global _steps_done
     _steps_done = counter
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def follow() -> None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
 
 
 def _work(results: Results, cell: Cell) -> None:

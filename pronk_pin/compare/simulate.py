@@ -133,11 +133,12 @@ class Simulation:
         with without_warnings():
             self._startup()
             self._pronk(progress)
+        self.log.finish(self.upright)
         return self.log
 
     def _startup(self) -> None:
         for _ in range(round(self.schedule.startup / self._dt)):
-            self._player.load(self._rows, self.controller.stand(1))
+            self._player.load(self._rows, self.controller.stand())
             self._advance()
         self._begin_stance(self._rows, np.full(len(self._rows), np.inf), 0.0)
 
@@ -167,7 +168,7 @@ class Simulation:
         player.tick += 1
         broken = ~world.finite
         if broken.any():
-            world.freeze(np.flatnonzero(broken))
+            world.restart(np.flatnonzero(broken))
             self.upright &= ~broken
 
     def _events(self, time: float) -> None:

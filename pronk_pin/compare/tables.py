@@ -122,7 +122,8 @@ def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
             f"{model['thigh']:.3f} rad in the thigh)."
         )
     fallen = int((table["robots"] - table["upright"]).sum())
-    sentences.append("No robot fell." if fallen == 0 else f"{fallen} robots fell.")
+    counted = {0: "No robot", 1: "One robot"}.get(fallen, f"{fallen} robots")
+    sentences.append(f"{counted} fell.")
     return " ".join(sentences)
 
 

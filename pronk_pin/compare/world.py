@@ -225,7 +225,7 @@ class World:
         """Which robots still have finite states, none huge (MuJoCo's limit), shape (n,)."""
         return np.asarray((np.abs(self._state[:, 0]) < mujoco.mjMAXVAL).all(axis=1))
 
-    def freeze(self, rows: IntArray) -> None:
+    def restart(self, rows: IntArray) -> None:
         """Put robots that left the finite numbers back to rest, so that the others go on."""
         self._state[rows, 0] = 0.0
         self._state[rows[:, None], 0, 1 + self._qpos] = self.robot.standing[7:]

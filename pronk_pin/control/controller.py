@@ -22,6 +22,9 @@ from .record import SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
 
+SOURCES = ("none", "model", "library")
+"""Where a controller's first feedforward can come from."""
+
 LATEST_TOUCHDOWN = 2.0
 """Flight ends without a touchdown after this many times its planned duration."""
 
@@ -32,7 +35,7 @@ class ControllerSpec:
 
     Attributes:
         name: Short name, as on the command line.
-        seed: Feedforward it begins with: "none", "model" or "library".
+        source: Where its feedforward comes from at first: "none", "model" or "library".
         law: Learning law that is switched on later, if any.
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
@@ -43,7 +46,7 @@ class ControllerSpec:
     """
 
     name: str
-    seed: str = "none"
+    source: str = "none"
     law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
@@ -52,8 +55,8 @@ class ControllerSpec:
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
-        if self.seed not in ("none", "model", "library"):
-            raise UnknownName("feedforward seed", self.seed, ("none", "model", "library"))
+        if self.source not in SOURCES:
+            raise UnknownName("source of feedforward", self.source, SOURCES)
 
 
 CONTROLLERS = {
@@ -61,9 +64,9 @@ CONTROLLERS = {
     for spec in (
         ControllerSpec("pd"),
         ControllerSpec("ilc", law=PDTypeILC()),
-        ControllerSpec("model", seed="model"),
-        ControllerSpec("library", seed="library"),
-        ControllerSpec("model+ilc", seed="model", law=PDTypeILC()),
+        ControllerSpec("model", source="model"),
+        ControllerSpec("library", source="library"),
+        ControllerSpec("model+ilc", source="model", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
     )
 }
@@ -149,12 +152,11 @@ class Controller:
         """Length of the longest tape."""
         return int(max(self.stance_ticks.max(), self.flight_ticks.max()))
 
-    def stand(self, ticks: int) -> Tape:
-        """The start-up: every robot holds the posture in which its stance begins."""
-        n = len(self.gaits)
-        shape = (n, min(ticks, self.max_ticks), NL)
-        position = np.broadcast_to(self._stance[:, :1], shape)
-        return Tape(np.zeros(shape), position, np.zeros(shape), np.full(n, shape[1]))
+    def stand(self) -> Tape:
+        """One tick of the start-up: every robot holds the posture in which its stance begins."""
+        position = self._stance[:, :1]
+        zero = np.zeros_like(position)
+        return Tape(zero, position, zero, np.ones(len(position), dtype=np.intp))
 
     def touchdown(self, rows: IntArray, duration: Array) -> Tape:
         """Stance tapes for robots that have just touched down; learns from their last stride.
@@ -195,7 +197,7 @@ class Controller:
         error = resample(self._stance[rows] - log.joints[:, stance], index)
         rate = resample(self._stance_rate[rows] - log.joint_rates[:, stance], index)
         feedback, feedforward = resample(log.feedback, index), self.feedforward[rows]
-        return StrideRecord(error, rate, feedback, feedforward, np.ones(len(rows)))
+        return StrideRecord(error, rate, feedback, feedforward, np.full(len(rows), np.nan))
 
     def _learn(self, law: LearningLaw, rows: IntArray, duration: Array) -> None:
         """Update the feedforward of those robots whose last stride is worth learning from."""

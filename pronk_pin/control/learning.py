@@ -40,7 +40,8 @@ class StrideSelection:
     def usable(self, record: StrideRecord) -> BoolArray:
         """Which robots' strides are, shape (n,)."""
         finite = np.isfinite(record.error).all(axis=(1, 2))
-        within = (record.duration >= self.shortest) & (record.duration <= self.longest)
+        duration = record.relative_duration  # NaN is not within
+        within = (duration >= self.shortest) & (duration <= self.longest)
         return np.asarray(finite & within)
 
 

@@ -54,14 +54,15 @@ class StrideRecord:
         error_rate: Its time derivative [rad/s].
         feedback: Torque of the feedback, eq. (9) [N m].
         feedforward: Torque of the feedforward [N m].
-        duration: Duration of the whole stride over that of the reference, shape (n,).
+        relative_duration: Duration of the stride over the reference's, shape (n,); NaN as long as
+            the stride goes on.
     """
 
     error: Array
     error_rate: Array
     feedback: Array
     feedforward: Array
-    duration: Array
+    relative_duration: Array
 
 
 def phase_grid(samples: int = SAMPLES) -> Array:

@@ -156,12 +156,15 @@ def test_each_robot_learns_from_its_own_strides_only(
     assert np.all(controller.feedforward[1] > 0.0)
 
 
-def test_nothing_is_learned_before_the_first_stride(
-    controller: Controller, gaits: list[Gait]
+def test_what_a_robot_begins_with_is_not_forgotten_before_the_first_stride(
+    robot: Robot, gaits: list[Gait]
 ) -> None:
+    given = np.ones((2, SAMPLES, 12))
+    spec = load_controller("model+ilc")
+    controller = Controller(robot, gaits, spec, timestep=DT, feedforward=given)
     controller.learning = True
     controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
-    np.testing.assert_array_equal(controller.feedforward, 0.0)
+    np.testing.assert_array_equal(controller.feedforward, given)
 
 
 @pytest.mark.parametrize(("name", "learning"), [("ilc", False), ("pd", True), ("library", True)])
@@ -191,9 +194,9 @@ def test_what_was_handed_in_is_not_changed_by_learning(
 def test_standing_holds_the_posture_in_which_stance_begins(
     controller: Controller, gaits: list[Gait]
 ) -> None:
-    tape = controller.stand(3)
+    tape = controller.stand()
     start = [gait.stance.joint_reference(np.array([0.0]))[0][0] for gait in gaits]
-    np.testing.assert_allclose(tape.position, np.repeat(np.array(start)[:, None], 3, axis=1))
+    np.testing.assert_allclose(tape.position[:, 0], start)
     assert not tape.velocity.any()
     assert not tape.feedforward.any()
 
@@ -214,8 +217,8 @@ def test_an_unknown_controller_is_refused_with_the_known_ones() -> None:
 
 
 def test_an_unknown_source_of_the_feedforward_is_refused() -> None:
-    with pytest.raises(UnknownName, match="unknown feedforward seed 'oracle'"):
-        ControllerSpec("mine", seed="oracle")
+    with pytest.raises(UnknownName, match="unknown source of feedforward 'oracle'"):
+        ControllerSpec("mine", source="oracle")
 
 
 def test_every_controller_is_known_by_its_own_name() -> None:
