@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import textwrap
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from .paper import table_1
 SHOWN = ("calf", "thigh")
 """Joints of the paper's Table I."""
 
+_WIDTH = 96
 _QUANTITIES = ("PD", "ILC", "reduction")
 
 
@@ -132,7 +134,7 @@ def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
     parts = [
         _format_beside(beside_the_paper(summary, scenario=scenario)),
         _format_overview(overview(summary, scenario=scenario)),
-        verdict(summary, scenario=scenario),
+        textwrap.fill(verdict(summary, scenario=scenario), _WIDTH),
     ]
     return "\n\n".join(part for part in parts if part)
 
@@ -149,7 +151,7 @@ def _format_beside(table: pd.DataFrame) -> str:
             pd_, ilc, less = (row.get((joint, source, name), np.nan) for name in _QUANTITIES)
             cells += f"{_number(pd_, '.3f'):>8}{_number(ilc, '.3f'):>7}{_number(less, '.0%'):>7}"
         lines.append(f"{speed if isinstance(speed, str) else f'{speed:.2g}':>6}{cells}")
-    return "\n".join(lines)
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def _format_overview(table: pd.DataFrame) -> str:
