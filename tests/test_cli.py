@@ -59,6 +59,20 @@ def test_pages_need_nothing_from_outside(result: Path) -> None:
         assert not re.search(r"""(src|href)=["'](?!data:|#)""", text), name
 
 
+def test_one_speed_and_one_controller_are_a_comparison_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = ["--speeds", "0.3", "--schedule.practice", "1.5", "--schedule.learning", "0.5"]
+    folder = ["--folder", str(tmp_path / "one")]
+    assert main(["compare", *short, "--controllers", "model", *folder]) == 0
+    assert "1 of 1" in capsys.readouterr().out
+    assert main(["report", str(tmp_path / "one"), "--figures", str(tmp_path / "figures")]) == 0
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {
+        "errors.svg",
+        "learning.svg",
+    }
+
+
 def test_report_prints_the_table_again(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (result / "report.html").unlink()
     assert main(["report", str(result)]) == 0

@@ -65,24 +65,15 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     mine = summary[summary["scenario"] == scenario]
     rows = {}
     for controller, part in mine.groupby("controller"):
-        value = part.set_index(["metric", "joint"])["value"].sort_index()
-
-        def mean(
-            metric: str, joint: str = "-", values: pd.Series[float] = value, size: bool = False
-        ) -> float:
-            found = values.loc[(metric, joint)]
-            return float((found.abs() if size else found).mean())
-
-        strides = part[(part["metric"] == "strides_to_converge") & (part["joint"] == "-")]["value"]
-        upright = part[part["metric"] == "upright"]["value"]
+        strides, upright = _values(part, "strides_to_converge"), _values(part, "upright")
         rows[controller] = {
-            **{joint: mean("peak_error", joint) for joint in SHOWN},
-            **{f"{joint}_rms": mean("rms_error", joint) for joint in SHOWN},
-            "strides": float(strides.max(skipna=False)) if len(strides) else float("nan"),
-            "feedback": mean("feedback_share"),
-            "speed_error": mean("speed_error", size=True),
-            "apex_error": mean("apex_error", size=True),
-            "upright": int(upright.sum()),
+            **{joint: _values(part, "peak_error", joint).mean() for joint in SHOWN},
+            **{f"{joint}_rms": _values(part, "rms_error", joint).mean() for joint in SHOWN},
+            "strides": strides.max(skipna=False),
+            "feedback": _values(part, "feedback_share").mean(),
+            "speed_error": _values(part, "speed_error").abs().mean(),
+            "apex_error": _values(part, "apex_error").abs().mean(),
+            "upright": upright.sum(),
             "robots": len(upright),
         }
     table = pd.DataFrame(rows).T.rename_axis("controller")
@@ -90,6 +81,11 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
         for joint in SHOWN:
             table[f"{joint}_reduction"] = 1.0 - table[joint] / table.loc["pd", joint]
     return table.sort_values("calf", ascending=False)
+
+
+def _values(rows: pd.DataFrame, metric: str, joint: str = "-") -> pd.Series[float]:
+    """All values of one metric and joint."""
+    return rows[(rows["metric"] == metric) & (rows["joint"] == joint)]["value"]
 
 
 def worst_reduction(summary: pd.DataFrame, *, scenario: str, controller: str) -> dict[str, float]:
@@ -105,9 +101,11 @@ def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
     if not {"pd", "ilc"} <= set(table.index):
         return ""
     practice = table.loc["ilc"]
+    worst = worst_reduction(summary, scenario=scenario, controller="ilc")
     sentences = [
         f"Practice cuts the mean peak error by {practice['calf_reduction']:.0%} in the calf and "
-        f"{practice['thigh_reduction']:.0%} in the thigh against PD"
+        f"{practice['thigh_reduction']:.0%} in the thigh against PD "
+        f"({worst['calf']:.0%} and {worst['thigh']:.0%} at the worst speed)"
         + (
             f", within {practice['strides']:.0f} strides at every speed."
             if np.isfinite(practice["strides"])
