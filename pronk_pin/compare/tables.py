@@ -115,12 +115,13 @@ def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
     if "model" in table.index:
         model = table.loc["model"]
         wins = [joint for joint in SHOWN if practice[joint] < model[joint]]
-        answer = {2: "beats", 1: f"beats in the {wins[0] if wins else ''} only", 0: "does not beat"}
-        sentences.append(
-            f"It {answer[len(wins)]} the model's feedforward ({practice['calf']:.3f} against "
-            f"{model['calf']:.3f} rad in the calf, {practice['thigh']:.3f} against "
-            f"{model['thigh']:.3f} rad in the thigh)."
+        beats = "beats" if wins else "does not beat"
+        where = f" in the {wins[0]} only" if len(wins) == 1 else ""
+        numbers = ", ".join(
+            f"{practice[joint]:.4f} against {model[joint]:.4f} rad in the {joint}"
+            for joint in SHOWN
         )
+        sentences.append(f"It {beats} the model's feedforward{where} ({numbers}).")
     fallen = int((table["robots"] - table["upright"]).sum())
     counted = {0: "No robot", 1: "One robot"}.get(fallen, f"{fallen} robots")
     sentences.append(f"{counted} fell.")

@@ -57,14 +57,14 @@ class PDTypeILC:
     Attributes:
         gain: Learning gain; 0 to 1.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase.
+        delta: Look-ahead in phase; shorter ones leave more ripple from stride to stride.
         gains: Weights of the error and its rate: eq. (10).
         filter: The learning filter Q.
     """
 
     gain: float = 0.5
     leak: float = 0.005
-    delta: float = 0.06
+    delta: float = 0.09
     gains: Gains = field(default_factory=Gains)
     filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.04))
 

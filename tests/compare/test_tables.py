@@ -70,7 +70,7 @@ def test_the_verdict_says_in_words_what_the_numbers_say(summary: pd.DataFrame) -
     words = verdict(summary, scenario="nominal")
     assert "by 80% in the calf and 80% in the thigh against PD" in words
     assert "within 8 strides at every speed" in words
-    assert "It beats in the calf only the model's feedforward" in words
+    assert "It beats the model's feedforward in the calf only" in words
     assert words.endswith("No robot fell.")
 
 
