@@ -47,6 +47,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
     Per joint (mean over the legs and the steady strides):
         peak_error: Peak of the stance error against the unmodified reference [rad].
         rms_error: Its root mean square [rad].
+        contact_error: The peak counted from the contact on, two ticks before it is felt [rad].
         strides_to_converge: See `strides_to_converge`; thigh and calf, and `-` for the later one.
     Per robot:
         upright: 1 if it never fell.
@@ -78,9 +79,11 @@ def _rows(strides: xr.Dataset, k: int) -> Iterator[dict[str, object]]:
 
     peak = by_joint(end["peak_error"]).mean("stride")
     rms = by_joint(end["rms_error"] ** 2).mean("stride") ** 0.5
+    contact = by_joint(end["contact_error"]).mean("stride")
     for joint in JOINTS:
         yield row("peak_error", peak.sel(joint=joint), "rad", joint)
         yield row("rms_error", rms.sel(joint=joint), "rad", joint)
+        yield row("contact_error", contact.sel(joint=joint), "rad", joint)
     yield row("upright", end["upright"].min(), "1")
     yield row("speed_error", end["mean_speed"].mean() - end["speed"], "m/s")
     yield row("apex_error", end["apex"].mean() - end["planned_apex"], "m")

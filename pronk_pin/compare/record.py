@@ -28,6 +28,7 @@ class StrideLog:
         scalars: Quantities of a stride by name, each of shape (n, strides); NaN where none.
         peak_error: Peak of the stance error [rad], shape (n, strides, 12).
         rms_error: Root mean square of the stance error [rad], shape (n, strides, 12).
+        contact_error: Peak from the contact on, before it was felt [rad], shape (n, strides, 12).
         curves: In stance the `error` [rad], `feedback` and `feedforward` [N m], in `flight` the
             joint angles [rad], each of shape (n, strides, samples, 12).
         base: Trunk x, z [m] in `stance` and `flight`, each of shape (n, strides, samples, 2).
@@ -45,7 +46,7 @@ class StrideLog:
         self._open_x = np.zeros(n)
         self.count = np.zeros(n, dtype=np.intp)
         self.scalars = {name: np.full((n, size), np.nan) for name in self.SCALARS}
-        self.peak_error, self.rms_error = np.full((2, n, size, NL), np.nan)
+        self.peak_error, self.rms_error, self.contact_error = np.full((3, n, size, NL), np.nan)
         shape = (n, size, SAMPLES)
         self.curves = {name: np.full((*shape, NL), np.nan, np.float32) for name in self.CURVES}
         self.base = {name: np.full((*shape, 2), np.nan, np.float32) for name in self.PHASES}
@@ -61,28 +62,31 @@ class StrideLog:
         at = (rows, self.count[rows])
         self.peak_error[at] = np.abs(record.error).max(axis=1)
         self.rms_error[at] = np.sqrt(np.mean(record.error**2, axis=1))
+        self.contact_error[at] = np.maximum(self.peak_error[at], record.contact_error)
         self.scalars["stance"][at] = log.length * self._timestep
         for name in ("error", "feedback", "feedforward"):
             self.curves[name][at] = getattr(record, name)[:, ::_EVERY]
         self.base["stance"][at] = _on_grid(base, log)
 
-    def flight(self, rows: IntArray, log: PhaseLog, base: Array, x: Array) -> None:
-        """A flight has ended: its log, the trunk (m, ticks, 2), and the trunk's x now (m,)."""
+    def flight(self, rows: IntArray, log: PhaseLog, base: Array) -> None:
+        """A flight has ended: its log, and the trunk (m, ticks, 2)."""
         at = (rows, self.count[rows])
         self.curves["flight"][at] = _on_grid(log.joints, log)
         self.base["flight"][at] = _on_grid(base, log)
         ticks = np.arange(base.shape[1])
-        flying = (ticks >= log.begin[:, None]) & (ticks < log.length[:, None])
-        height = np.where(flying, base[..., 1], -np.inf)
+        height = np.where(ticks < log.length[:, None], base[..., 1], -np.inf)
         self.scalars["apex"][at] = height.max(axis=1)
-        self.scalars["speed"][at] = x - self._open_x[rows]  # a distance until the stride closes
 
-    def close(self, rows: IntArray, time: float, upright: BoolArray) -> Array:
-        """A stride has ended; its duration [s], shape (m,)."""
+    def close(self, rows: IntArray, time: float, x: Array, upright: BoolArray) -> Array:
+        """A stride ends: touchdown at a time [s] and trunk position x (m,) [m].
+
+        Returns:
+            Durations of the strides [s], shape (m,).
+        """
         at = (rows, self.count[rows])
         duration = time - self.scalars["start"][at]
         self.scalars["duration"][at] = duration
-        self.scalars["speed"][at] /= duration
+        self.scalars["speed"][at] = (x - self._open_x[rows]) / duration
         self.scalars["upright"][at] = upright
         self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
         return np.asarray(duration)

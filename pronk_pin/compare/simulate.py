@@ -104,6 +104,8 @@ class Simulation:
         self._player = Player(n, ticks, spec.gains, robot.tau_max)
         self._joints, self._rates, self._feedback, self._forward = np.zeros((4, n, ticks, NL))
         self._base = np.zeros((n, ticks, 2))
+        self._channels = self._joints, self._rates, self._feedback, self._forward, self._base
+        self._late = spec.touchdown_ticks
         self._flying = np.zeros(n, dtype=bool)
         self._rows = np.arange(n)
         self._load = _TOUCHDOWN_LOAD * robot.mass * robot.gravity
@@ -140,6 +142,10 @@ class Simulation:
         for _ in range(round(self.schedule.startup / self._dt)):
             self._player.load(self._rows, self.controller.stand())
             self._advance()
+        # The first stance begins as if its touchdown had been felt late, with the robots at rest.
+        self._joints[:, : self._late] = self.world.joints[:, None]
+        self._rates[:, : self._late] = self.world.joint_rates[:, None]
+        self._base[:, : self._late] = self.world.base[:, None]
         self._begin_stance(self._rows, np.full(len(self._rows), np.inf), 0.0)
 
     def _pronk(self, progress: Progress | None) -> None:
@@ -186,28 +192,34 @@ class Simulation:
                 event(rows, time)
 
     def _begin_flight(self, rows: IntArray, time: float) -> None:
-        log = self._phase_log(rows)
+        log = self._phase_log(rows, self._player.tick[rows], felt=self._late)
         tape, record = self.controller.liftoff(rows, log)
         self.log.stance(rows, record, log, self._base[rows])
         self._player.load(rows, tape)
         self._flying[rows] = True
 
     def _end_flight(self, rows: IntArray, time: float) -> None:
-        self.log.flight(rows, self._phase_log(rows), self._base[rows], self.world.base[rows, 0])
-        duration = self.log.close(rows, time, self.upright[rows])
-        self._begin_stance(rows, duration, time)
+        # Felt late: the last ticks of the flight's tape are the first of the stance.
+        flown, touchdown = self._player.tick[rows] - self._late, time - self._late * self._dt
+        self.log.flight(rows, self._phase_log(rows, flown), self._base[rows])
+        felt = flown[:, None] + np.arange(self._late)  # (m, late)
+        for channel in self._channels:
+            channel[rows, : self._late] = channel[rows[:, None], felt]
+        duration = self.log.close(rows, touchdown, self._base[rows, 0, 0], self.upright[rows])
+        self._begin_stance(rows, duration, touchdown)
 
-    def _begin_stance(self, rows: IntArray, duration: Array, time: float) -> None:
+    def _begin_stance(self, rows: IntArray, duration: Array, touchdown: float) -> None:
         self._player.load(rows, self.controller.touchdown(rows, duration))
         self._flying[rows] = False
-        self.log.open(rows, time, self.world.base[rows, 0], learning=self.controller.learning)
+        x = self._base[rows, 0, 0]
+        self.log.open(rows, touchdown, x, learning=self.controller.learning)
 
-    def _phase_log(self, rows: IntArray) -> PhaseLog:
+    def _phase_log(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
         return PhaseLog(
             self._joints[rows],
             self._rates[rows],
             self._feedback[rows],
             self._forward[rows],
-            self._player.begin[rows],
-            self._player.tick[rows],
+            length,
+            felt,
         )

@@ -27,6 +27,7 @@ _UNITS = {
     "learning": ("1", "1 where the stride was played with the learning law on"),
     "peak_error": ("rad", "peak of the stance error against the unmodified reference"),
     "rms_error": ("rad", "root mean square of the stance error"),
+    "contact_error": ("rad", "peak of the stance error from the contact on, before it was felt"),
     "error": ("rad", "reference minus measured joint angle in stance"),
     "feedback": ("N m", "torque of the feedback in stance"),
     "feedforward": ("N m", "torque of the feedforward in stance"),
@@ -89,6 +90,7 @@ def _recorded(log: StrideLog) -> dict[str, _Variable]:
         **{names.get(name, name): (per_stride, array) for name, array in log.scalars.items()},
         "peak_error": (per_joint, log.peak_error),
         "rms_error": (per_joint, log.rms_error),
+        "contact_error": (per_joint, log.contact_error),
         **{name: (curve, array) for name, array in log.curves.items()},
         **{f"base_{name}": (path, array) for name, array in log.base.items()},
     }

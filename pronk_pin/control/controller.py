@@ -7,7 +7,7 @@ whoever plays the tapes; the controller is called at the events and answers with
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class ControllerSpec:
         selection: Strides worth learning from.
         speed_filter: Time constant of the speed estimate's filter [s].
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
-            contact sensor is one late, and the contact began between two.
+            contact sensor is one late, and the contact began between two ticks.
     """
 
     name: str
@@ -57,6 +57,8 @@ class ControllerSpec:
     def __post_init__(self) -> None:
         if self.source not in SOURCES:
             raise UnknownName("source of feedforward", self.source, SOURCES)
+        if self.touchdown_ticks < 1:
+            raise InvalidInput("touchdown_ticks must be 1 or more: contacts are sensed a tick late")
 
 
 CONTROLLERS = {
@@ -114,9 +116,7 @@ class Controller:
         self.feedforward = feedforward.copy()
         self.learning = False
         self._timestep = timestep
-        # Error, its rate, feedback and feedforward of each robot's last stance.
-        self._last = np.zeros((4, n, SAMPLES, NL))
-        self._practised = np.zeros(n, dtype=bool)
+        self._last = StrideRecord.unknown(n)
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
@@ -178,8 +178,7 @@ class Controller:
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
         """Flight tapes for robots that have just finished a stance, and the stance's record."""
         record = self._record(rows, log)
-        self._last[:, rows] = record.error, record.error_rate, record.feedback, record.feedforward
-        self._practised[rows] = True
+        self._last.put(rows, record)
         speed = self._estimator.update(rows, log)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         share, rate = self._turn[rows] * turn, self._turn_rate[rows] * turn  # (m, ticks)
@@ -191,20 +190,24 @@ class Controller:
 
     def _record(self, rows: IntArray, log: PhaseLog) -> StrideRecord:
         """The stance on the phase grid, aligned on t / T of the reference."""
-        ticks = self._stance_time[rows] / self._timestep
-        index = log.index(phase_grid(), ticks)
-        stance = slice(self._stance.shape[1])
-        error = resample(self._stance[rows] - log.joints[:, stance], index)
-        rate = resample(self._stance_rate[rows] - log.joint_rates[:, stance], index)
-        feedback, feedforward = resample(log.feedback, index), self.feedforward[rows]
-        return StrideRecord(error, rate, feedback, feedforward, np.full(len(rows), np.nan))
+        index = log.index(phase_grid(), self._stance_time[rows] / self._timestep)
+        ticks = slice(self._stance.shape[1])
+        error = self._stance[rows] - log.joints[:, ticks]
+        rate = self._stance_rate[rows] - log.joint_rates[:, ticks]
+        return StrideRecord(
+            error=resample(error, index),
+            error_rate=resample(rate, index),
+            feedback=resample(log.feedback, index),
+            feedforward=self.feedforward[rows],
+            contact_error=np.abs(error[:, : log.felt]).max(axis=1, initial=0.0),
+            relative_duration=np.full(len(rows), np.nan),
+        )
 
     def _learn(self, law: LearningLaw, rows: IntArray, duration: Array) -> None:
         """Update the feedforward of those robots whose last stride is worth learning from."""
         planned = self._stance_time[rows] + self._flight_time[rows]
-        error, rate, feedback, feedforward = self._last[:, rows]
-        record = StrideRecord(error, rate, feedback, feedforward, duration / planned)
-        usable = self.spec.selection.usable(record) & self._practised[rows]
+        record = replace(self._last.take(rows), relative_duration=duration / planned)
+        usable = self.spec.selection.usable(record)
         if usable.any():
             self.feedforward[rows[usable]] = law.update(record)[usable]
 

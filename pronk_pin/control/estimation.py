@@ -38,12 +38,9 @@ class SpeedEstimator:
         velocity = leg_odometry(
             self._robot, q.reshape(n * ticks, -1), v.reshape(n * ticks, -1), contact="rolling"
         )
-        # Ticks before the first measured one hold the phase before.
-        measured = np.arange(ticks) >= log.begin[:, None]
-        start = self.speed[rows]
         filtered = first_order(
-            np.where(measured, velocity[:, 0].reshape(n, ticks), start[:, None]),
-            start,
+            velocity[:, 0].reshape(n, ticks),
+            self.speed[rows],
             time_constant=self._time_constant,
             timestep=self._timestep,
         )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from .._typing import Array, IntArray
+from ..robot import NL
 
 SAMPLES = 161
 """Samples of the phase grid s = 0 ... 1 on which strides are recorded and learned."""
@@ -21,33 +22,36 @@ class PhaseLog:
         joint_rates: Joint velocities [rad/s], shape (n, ticks, 12).
         feedback: Torque of the feedback [N m], shape (n, ticks, 12).
         feedforward: Torque of the feedforward [N m], shape (n, ticks, 12).
-        begin: First tick that was measured, shape (n,).
-        length: Tick at which the phase ended; later ones hold nothing of it, shape (n,).
+        length: Ticks that the phase lasted; later ones hold nothing of it, shape (n,).
+        felt: Tick at which its beginning was felt: those before were played on the tape before.
     """
 
     joints: Array
     joint_rates: Array
     feedback: Array
     feedforward: Array
-    begin: IntArray
     length: IntArray
+    felt: int = 0
 
     def index(self, s: Array, ticks: Array | None = None) -> Array:
         """Fractional ticks at which phases s (m,) were measured, shape (n, m).
 
         Args:
             s: Phases.
-            ticks: Ticks that s = 1 stands for, shape (n,); by default the last measured one. Phases
-                outside the measured ticks are held at the first or the last of them.
+            ticks: Ticks that s = 1 stands for, shape (n,); by default the last measured one.
+                Phases outside those that were felt are held at the first or the last of them.
         """
         last = self.length[:, None] - 1.0
         index = s * (last if ticks is None else ticks[:, None])
-        return np.asarray(np.clip(index, self.begin[:, None], last))
+        return np.asarray(np.clip(index, self.felt, last))
 
 
 @dataclass(frozen=True)
 class StrideRecord:
-    """The stance of n robots on the phase grid; all arrays have the shape (n, samples, 12).
+    """The stance of n robots on the phase grid, from the touchdown's being felt on.
+
+    Arrays have the shape (n, samples, 12) where nothing else is said; before the touchdown was felt
+    they hold the first value after it.
 
     Attributes:
         error: Unmodified reference minus measured joint angle [rad]: eq. (8).
@@ -56,6 +60,7 @@ class StrideRecord:
         feedforward: Torque of the feedforward [N m].
         relative_duration: Duration of the stride over the reference's, shape (n,); NaN as long as
             the stride goes on.
+        contact_error: Largest error between the contact and its being felt [rad], shape (n, 12).
     """
 
     error: Array
@@ -63,6 +68,22 @@ class StrideRecord:
     feedback: Array
     feedforward: Array
     relative_duration: Array
+    contact_error: Array
+
+    @classmethod
+    def unknown(cls, n: int) -> StrideRecord:
+        """The record of n robots that have made no stride yet: NaN."""
+        shapes = [(n, SAMPLES, NL)] * 4 + [(n,), (n, NL)]
+        return cls(*(np.full(shape, np.nan) for shape in shapes))
+
+    def take(self, rows: IntArray) -> StrideRecord:
+        """The record of some of the robots, copied."""
+        return replace(self, **{item.name: getattr(self, item.name)[rows] for item in fields(self)})
+
+    def put(self, rows: IntArray, other: StrideRecord) -> None:
+        """Overwrite the record of some robots by that of others."""
+        for item in fields(self):
+            getattr(self, item.name)[rows] = getattr(other, item.name)
 
 
 def phase_grid(samples: int = SAMPLES) -> Array:

@@ -66,7 +66,6 @@ class Player:
 
     Attributes:
         tick: Tick at which each robot's tape is, shape (n,).
-        begin: Tick at which it began, shape (n,).
         length: Length of each robot's tape, shape (n,).
     """
 
@@ -74,7 +73,7 @@ class Player:
         self._feedforward, self._position, self._velocity = np.zeros((3, n, ticks, NL))
         self._kp, self._kd, self._tau_max = gains.proportional, gains.derivative, tau_max
         self._rows = np.arange(n)
-        self.tick, self.begin, self.length = np.zeros((3, n), dtype=np.intp)
+        self.tick, self.length = np.zeros((2, n), dtype=np.intp)
 
     def load(self, rows: IntArray, tape: Tape) -> None:
         """Put a tape in for some robots, wound to where it begins."""
@@ -82,7 +81,7 @@ class Player:
         self._feedforward[rows, :ticks] = tape.feedforward
         self._position[rows, :ticks] = tape.position
         self._velocity[rows, :ticks] = tape.velocity
-        self.length[rows], self.tick[rows], self.begin[rows] = tape.length, tape.begin, tape.begin
+        self.length[rows], self.tick[rows] = tape.length, tape.begin
 
     def play(self, joints: Array, joint_rates: Array) -> tuple[Array, Array, Array]:
         """Torques at this tick: the sum within the limits, its feedback, its feedforward [N m].

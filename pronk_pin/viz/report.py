@@ -40,6 +40,8 @@ _LIMITS = (
     "comes from tracking in flight.",
     "Peaks are against the unmodified reference, as means over the legs and the last 30 strides; "
     "the paper does not say how its peaks are taken.",
+    "Errors count from when the touchdown is felt; the metric contact_error in summary.csv counts "
+    "from the contact itself, one to two ticks earlier.",
     "One seed stands for one scatter of the starting posture; there are no intervals.",
 )
 

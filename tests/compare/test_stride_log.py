@@ -14,11 +14,12 @@ from pronk_pin.gait import Gait
 DT = 0.001
 SHAPE = (1, CONTROL_SAMPLES, 12)
 ROW = np.array([1])
+CONTACT = np.full((1, 12), 0.04)
 
 
-def phase(ticks: int, *, begin: int = 0) -> PhaseLog:
+def phase(ticks: int, *, felt: int = 0) -> PhaseLog:
     joints = np.repeat(np.arange(ticks + 10.0)[None, :, None], 12, axis=2)
-    return PhaseLog(joints, joints, joints, joints, np.array([begin]), np.array([ticks]))
+    return PhaseLog(joints, joints, joints, joints, np.array([ticks]), felt)
 
 
 def trunk(ticks: int, z: Array) -> Array:
@@ -33,12 +34,12 @@ def log(gaits: list[Gait]) -> StrideLog:
     log = StrideLog(gaits, duration=10.0, timestep=DT)
     error = np.zeros(SHAPE)
     error[0, :, 5] = 0.1 * np.sin(2.0 * np.pi * phase_grid())
-    record = StrideRecord(error, 0.0 * error, 2.0 * error, 3.0 * error, np.ones(1))
+    record = StrideRecord(error, 0.0 * error, 2.0 * error, 3.0 * error, np.ones(1), CONTACT)
     log.open(ROW, 1.0, np.array([0.7]), learning=True)
-    log.stance(ROW, record, phase(160, begin=2), trunk(160, np.full(160, 0.3)))
+    log.stance(ROW, record, phase(160, felt=2), trunk(160, np.full(160, 0.3)))
     height = 0.34 - 0.1 * np.linspace(-1.0, 1.0, 201) ** 2
-    log.flight(ROW, phase(201), trunk(201, height), np.array([0.9]))
-    assert log.close(ROW, 1.4, np.array([True])) == pytest.approx(0.4)
+    log.flight(ROW, phase(201), trunk(201, height))
+    assert log.close(ROW, 1.4, np.array([0.9]), np.array([True])) == pytest.approx(0.4)
     return log
 
 
@@ -63,6 +64,11 @@ def test_the_errors_of_a_sine_are_its_amplitude_and_that_over_root_two(log: Stri
     assert np.all(np.delete(log.peak_error[1, 0], 5) == 0.0)
 
 
+def test_the_contact_error_is_the_larger_of_before_and_after_it_was_felt(log: StrideLog) -> None:
+    assert log.contact_error[1, 0, 5] == log.peak_error[1, 0, 5]
+    assert np.all(np.delete(log.contact_error[1, 0], 5) == 0.04)
+
+
 def test_curves_are_kept_on_the_coarser_grid(log: StrideLog) -> None:
     sine = 0.1 * np.sin(2.0 * np.pi * phase_grid(SAMPLES))
     for name, scale in (("error", 1.0), ("feedback", 2.0), ("feedforward", 3.0)):
@@ -85,5 +91,5 @@ def test_a_full_log_keeps_its_size(gaits: list[Gait]) -> None:
     log = StrideLog(gaits, duration=0.5, timestep=DT)
     for k in range(20):
         log.open(ROW, float(k), np.zeros(1), learning=False)
-        log.close(ROW, k + 1.0, np.array([True]))
+        log.close(ROW, k + 1.0, np.zeros(1), np.array([True]))
     assert log.count[1] == log.scalars["start"].shape[1] - 1

@@ -22,11 +22,9 @@ def gaits() -> list[Gait]:
 def phase_log() -> Callable[..., PhaseLog]:
     """A log of joint angles and rates (n, ticks, 12), in which no torque acted."""
 
-    def build(joints: Array, joint_rates: Array, *, begin: int = 0) -> PhaseLog:
+    def build(joints: Array, joint_rates: Array, *, felt: int = 0) -> PhaseLog:
         n, ticks = joints.shape[:2]
         none = np.zeros_like(joints)
-        return PhaseLog(
-            joints, joint_rates, none, none, np.full(n, begin, np.intp), np.full(n, ticks, np.intp)
-        )
+        return PhaseLog(joints, joint_rates, none, none, np.full(n, ticks, np.intp), felt)
 
     return build

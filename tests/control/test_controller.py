@@ -38,7 +38,7 @@ def stances(gaits: list[Gait], phase_log: Callable[..., PhaseLog]) -> Callable[.
         ticks = round(gaits[0].stance.duration / DT)
         references = [g.stance.joint_reference(_phases(g.stance.duration, ticks)) for g in gaits]
         joints, joint_rates = (np.stack(part) for part in zip(*references, strict=True))
-        return phase_log(joints - offset, joint_rates, begin=2)
+        return phase_log(joints - offset, joint_rates, felt=2)
 
     return build
 
@@ -223,3 +223,13 @@ def test_an_unknown_source_of_the_feedforward_is_refused() -> None:
 
 def test_every_controller_is_known_by_its_own_name() -> None:
     assert all(name == spec.name for name, spec in CONTROLLERS.items())
+
+
+def test_what_happens_before_the_touchdown_is_felt_counts_as_contact_error_only(
+    controller: Controller, stances: Callable[..., PhaseLog]
+) -> None:
+    log = stances(0.01)
+    log.joints[:, :2] -= 0.2
+    _, record = controller.liftoff(BOTH, log)
+    np.testing.assert_allclose(record.contact_error, 0.21)
+    np.testing.assert_allclose(record.error, 0.01, atol=1e-12)

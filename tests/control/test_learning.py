@@ -25,12 +25,13 @@ from pronk_pin.errors import InvalidInput
 KP = Gains().proportional
 LOAD = 6.0 * np.linspace(-1.0, 1.0, 12)  # [N m]
 SHAPE = (1, SAMPLES, 12)
+NOTHING = np.zeros((1, 12))
 
 
 def stride(feedforward: Array) -> StrideRecord:
     """A stride of the quasi-static plant under a feedforward."""
     error = (LOAD - feedforward) / KP
-    return StrideRecord(error, np.zeros(SHAPE), KP * error, feedforward, np.ones(1))
+    return StrideRecord(error, np.zeros(SHAPE), KP * error, feedforward, np.ones(1), NOTHING)
 
 
 def practise(law: LearningLaw, strides: int) -> Array:
@@ -73,14 +74,18 @@ def test_the_printed_filter_holds_the_papers_law_at_78_percent_reduction() -> No
 def test_an_error_is_answered_earlier_by_the_look_ahead() -> None:
     s = phase_grid()
     bump = np.exp(-(((s - 0.5) / 0.1) ** 2))[None, :, None] * np.ones(12)
-    record = StrideRecord(bump, np.zeros(SHAPE), np.zeros(SHAPE), np.zeros(SHAPE), np.ones(1))
+    record = StrideRecord(
+        bump, np.zeros(SHAPE), np.zeros(SHAPE), np.zeros(SHAPE), np.ones(1), NOTHING
+    )
     peak = s[np.argmax(PDTypeILC(delta=0.1).update(record)[0, :, 0])]
     assert peak == pytest.approx(0.4, abs=0.01)
 
 
 def test_the_rate_of_the_error_is_weighted_with_the_derivative_gains() -> None:
     ones, none = np.ones(SHAPE), np.zeros(SHAPE)
-    learned = PDTypeILC(gain=0.5, leak=0.0).update(StrideRecord(none, ones, none, none, np.ones(1)))
+    learned = PDTypeILC(gain=0.5, leak=0.0).update(
+        StrideRecord(none, ones, none, none, np.ones(1), NOTHING)
+    )
     np.testing.assert_allclose(learned[0, 80], 0.5 * Gains().derivative, rtol=1e-6)
 
 
@@ -94,6 +99,6 @@ def test_only_finite_strides_of_about_the_right_length_are_worth_learning_from()
     duration = np.array([0.6, 0.75, 1.0, 1.35, 1.5, np.inf, np.nan, 1.0])
     error = np.zeros((8, SAMPLES, 12))
     error[7, 3, 4] = np.nan
-    record = StrideRecord(error, error, error, error, duration)
+    record = StrideRecord(error, error, error, error, duration, np.zeros((8, 12)))
     usable = StrideSelection().usable(record)
     assert usable.tolist() == [False, True, True, True, False, False, False, False]
