@@ -5,7 +5,7 @@ Leading dimensions are a batch: `(..., 19)` is one configuration or any batch of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -94,7 +94,7 @@ def leg_indices(robot: Robot, feet: Iterable[str] | None) -> list[int]:
     return [robot.legs.index(name) for name in names]
 
 
-def known_name(kind: str, name: str, known: Sequence[str]) -> str:
+def known_name(kind: str, name: str, known: Collection[str]) -> str:
     """The name itself, if it is known.
 
     Raises:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..errors import InvalidInput, UnknownName
+from .._state import known_name
+from ..errors import InvalidInput
 
 # Rotor inertia of Unitree's motor about its own axis; ref: links *_rotor of go1.urdf in
 # example-robot-data (the A1 has the same motor, and its URDF leaves the rotors out).
@@ -75,6 +76,4 @@ def load_scenario(name: str) -> Scenario:
     Raises:
         UnknownName: There is none.
     """
-    if name not in SCENARIOS:
-        raise UnknownName("scenario", name, SCENARIOS)
-    return SCENARIOS[name]
+    return SCENARIOS[known_name("scenario", name, SCENARIOS)]

@@ -27,7 +27,7 @@ Progress: TypeAlias = Callable[[int], object]
 _EARLIEST_TOUCHDOWN = 0.5
 """Phase of flight before which contact is the lift-off's, not a touchdown."""
 
-_TOUCHDOWN_LOAD = 0.1
+TOUCHDOWN_LOAD = 0.1
 """Share of the weight on the feet that counts as a touchdown."""
 
 _FALLEN = 0.6
@@ -108,7 +108,7 @@ class Simulation:
         self._late = spec.touchdown_ticks
         self._flying = np.zeros(n, dtype=bool)
         self._rows = np.arange(n)
-        self._load = _TOUCHDOWN_LOAD * robot.mass * robot.gravity
+        self._load = TOUCHDOWN_LOAD * robot.mass * robot.gravity
         self._earliest = np.array(
             [_EARLIEST_TOUCHDOWN * gait.flight.duration / dt for gait in gaits]
         )

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from .._state import known_name
 from .._typing import Array, IntArray
-from ..errors import InvalidInput, UnknownName
+from ..errors import InvalidInput
 from ..gait import Gait
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
@@ -55,8 +56,7 @@ class ControllerSpec:
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
-        if self.source not in SOURCES:
-            raise UnknownName("source of feedforward", self.source, SOURCES)
+        known_name("source of feedforward", self.source, SOURCES)
         if self.touchdown_ticks < 1:
             raise InvalidInput("touchdown_ticks must be 1 or more: contacts are sensed a tick late")
 
@@ -81,9 +81,7 @@ def load_controller(name: str) -> ControllerSpec:
     Raises:
         UnknownName: There is none.
     """
-    if name not in CONTROLLERS:
-        raise UnknownName("controller", name, CONTROLLERS)
-    return CONTROLLERS[name]
+    return CONTROLLERS[known_name("controller", name, CONTROLLERS)]
 
 
 class Controller:

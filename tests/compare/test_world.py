@@ -11,8 +11,9 @@ import pytest
 
 from pronk_pin._typing import Array
 from pronk_pin.compare import Scenario, World, build_model, load_scenario
+from pronk_pin.compare.simulate import TOUCHDOWN_LOAD
 from pronk_pin.compare.world import without_warnings
-from pronk_pin.control import Gains
+from pronk_pin.control import Gains, load_controller
 from pronk_pin.conventions import to_mujoco
 from pronk_pin.dynamics import mass_matrix, nonlinear_effects
 from pronk_pin.kinematics import foot_positions
@@ -211,3 +212,24 @@ def test_a_robot_that_is_not_finite_is_seen_and_put_back_to_rest(robot: Robot) -
     assert world.finite.all()
     np.testing.assert_array_equal(world.joints[1], robot.standing[7:])
     assert world.base[0, 1] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_touchdown_is_felt_within_the_ticks_that_the_controller_reckons_with(
+    robot: Robot,
+) -> None:
+    """From the instant at which the feet reach the ground, between two ticks."""
+    world, standing = World(robot, load_scenario("nominal"), 8), robot.standing[7:]
+    heights = robot.standing[2] + np.linspace(0.05, 0.06, world.n)  # contacts at all fractions
+    world.reset(np.column_stack([np.zeros(world.n), heights]), np.tile(standing, (world.n, 1)))
+    clearance, load = [], []
+    for _ in range(150):
+        position = np.column_stack([world.base[:, 0], np.zeros(world.n), world.base[:, 1]])
+        feet = foot_positions(robot, robot.q_from_base(position, world.joints))
+        clearance.append(feet[..., 2].min(axis=1) - robot.foot_radius)
+        load.append(world.force[..., 2].sum(axis=1))
+        world.step(Gains().proportional * (standing - world.joints))
+    felt = np.argmax(np.array(load) > TOUCHDOWN_LOAD * robot.mass * robot.gravity, axis=0)
+    for height, tick in zip(np.array(clearance).T, felt, strict=True):
+        below = int(np.argmax(height < 0.0))
+        contact = below - height[below] / (height[below] - height[below - 1])
+        assert 1.0 <= tick - contact <= load_controller("pd").touchdown_ticks
