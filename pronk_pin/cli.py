@@ -121,7 +121,7 @@ class Build:
 
     robot: str = "a1"
     """Robot."""
-    speeds: tuple[float, ...] = tuple(float(speed) for speed in SPEEDS)
+    speeds: tuple[float, ...] = SPEEDS
     """Speeds [m/s]."""
     apex: float = 0.34
     """Greatest height of the trunk [m]."""

@@ -73,10 +73,11 @@ class FileProblem(PronkError):
 
 
 def cannot_write(
-    path: Path | str, error: OSError, remedy: str = "choose another place, or make room"
+    path: Path | str, error: Exception, remedy: str = "choose another place, or make room"
 ) -> FileProblem:
-    """The `FileProblem` of a file or folder that the system refuses to write."""
-    return FileProblem(path, f"cannot be written ({error.strerror or error})", remedy)
+    """The `FileProblem` of a file or folder that the system, or a library, fails to write."""
+    reason = getattr(error, "strerror", None) or error
+    return FileProblem(path, f"cannot be written ({reason})", remedy)
 
 
 class GaitNotFound(PronkError):

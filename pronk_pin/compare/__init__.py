@@ -1,6 +1,6 @@
 """What happens, and what it says: worlds, simulations, experiments, metrics, results."""
 
-from .experiment import DEFAULT_CONTROLLERS, PAPER_SPEEDS, Cell, Experiment, run_cell
+from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
 from .metrics import reduction, steady, summarize
 from .results import Results, default_folder
 from .run import run_experiment
@@ -10,7 +10,6 @@ from .world import World, build_model
 
 __all__ = [
     "DEFAULT_CONTROLLERS",
-    "PAPER_SPEEDS",
     "SCENARIOS",
     "Cell",
     "Experiment",

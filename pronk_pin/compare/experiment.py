@@ -16,15 +16,12 @@ from .._typing import Array
 from ..control import ControllerSpec, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
-from ..gait import load_library
+from ..gait import SPEEDS, load_library
 from ..robot import load_robot
 from .metrics import steady
 from .scenario import load_scenario
 from .simulate import Progress, Schedule, Simulation
 from .strides import to_dataset
-
-PAPER_SPEEDS = tuple(float(v) for v in np.round(np.arange(-5, 9) * 0.1, 1))
-"""Speeds of the paper's gait library [m/s]."""
 
 DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
 
@@ -44,7 +41,7 @@ class Experiment:
     """
 
     robot: str = "a1"
-    speeds: tuple[float, ...] = PAPER_SPEEDS
+    speeds: tuple[float, ...] = SPEEDS
     controllers: tuple[str, ...] = DEFAULT_CONTROLLERS
     scenarios: tuple[str, ...] = ("nominal",)
     seeds: tuple[int, ...] = (0,)

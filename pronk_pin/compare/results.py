@@ -138,10 +138,7 @@ class Results:
         except (OSError, RuntimeError) as error:
             with contextlib.suppress(OSError):
                 partial.unlink()
-            reason = getattr(error, "strerror", None) or str(error)
-            raise FileProblem(
-                path, f"cannot be written ({reason})", "make room, and run the same command again"
-            ) from error
+            raise cannot_write(path, error, "make room, and run the same command again") from error
 
     def strides(self, cell: Cell) -> xr.Dataset:
         """The strides of a cell.

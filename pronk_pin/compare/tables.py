@@ -19,20 +19,18 @@ _WIDTH = 96
 _QUANTITIES = ("PD", "ILC", "reduction")
 
 
-def beside_the_paper(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") -> pd.DataFrame:
-    """Table I: peak stance errors [rad] with PD and with learning, ours beside the paper's.
+def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
+    """Table I: peak stance errors [rad] with PD and with ILC, ours beside the paper's.
 
     Args:
-        summary: The summary of a result that holds PD and the learner.
+        summary: The summary of a result that holds `pd` and `ilc`.
         scenario: The world.
-        learner: The learning controller.
 
     Returns:
         Rows by speed, and one of means; columns by joint, source ("ours", "paper") and quantity
         ("PD", "ILC", "reduction").
     """
     ours = summary[(summary["metric"] == "peak_error") & (summary["scenario"] == scenario)]
-    ours = ours.replace({"controller": {learner: "ilc"}}) if learner != "ilc" else ours
     parts = {}
     for joint in SHOWN:
         for source, table in (("ours", ours), ("paper", table_1())):
@@ -96,7 +94,7 @@ def worst_reduction(summary: pd.DataFrame, *, scenario: str, controller: str) ->
 
 
 def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
-    """The answer in words, computed from the numbers; empty without PD and a learner."""
+    """The answer in words, computed from the numbers; empty without `pd` and `ilc`."""
     table = overview(summary, scenario=scenario)
     if not {"pd", "ilc"} <= set(table.index):
         return ""

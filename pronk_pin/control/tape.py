@@ -1,4 +1,4 @@
-"""Between two events everything is a tape: feedforward torque, reference, gains, at every tick.
+"""Between two events everything is a tape: feedforward torque and reference at every tick.
 
 A controller writes a tape at each touchdown and lift-off; the simulation plays it:
 `tau = ff + kp (q_d - q) + kd (v_d - v)`, clipped to the motors' limits.

@@ -8,6 +8,7 @@ import numpy as np
 
 from .._typing import Array
 from ..errors import InvalidInput, SpeedOutOfRange
+from .record import resample
 
 
 @dataclass(frozen=True)
@@ -41,13 +42,9 @@ class TorqueLibrary:
         Raises:
             SpeedOutOfRange: The library does not cover a speed.
         """
-        out = []
-        for speed in np.atleast_1d(speeds):
-            if not self.speeds[0] - 1e-9 <= speed <= self.speeds[-1] + 1e-9:
-                raise SpeedOutOfRange(speed, float(self.speeds[0]), float(self.speeds[-1]))
-            position = np.interp(speed, self.speeds, np.arange(len(self.speeds)))
-            lower = int(position)
-            upper = min(lower + 1, len(self.speeds) - 1)
-            weight = position - lower
-            out.append((1.0 - weight) * self.torque[lower] + weight * self.torque[upper])
-        return np.stack(out)
+        wanted, lowest, highest = np.atleast_1d(speeds), self.speeds[0], self.speeds[-1]
+        for speed in wanted:
+            if not lowest - 1e-9 <= speed <= highest + 1e-9:
+                raise SpeedOutOfRange(float(speed), float(lowest), float(highest))
+        position = np.interp(wanted, self.speeds, np.arange(len(self.speeds)))
+        return np.asarray(resample(self.torque[None], position[None])[0])

@@ -22,7 +22,7 @@ import numpy as np
 from .._typing import Array
 from ..robot import JOINTS
 from .folded_model import FoldedModel, fold
-from .newton_euler import NB
+from .newton_euler import NB_FOLDED
 from .problem import GaitProblem
 from .transcription import Constraint, Transcription, Unknown
 
@@ -115,14 +115,14 @@ def _unknowns(problem: GaitProblem, model: FoldedModel) -> dict[str, Unknown]:
     low, high = kept.q_min[joints], kept.q_max[joints]
     low = np.where(hip, np.maximum(low, -problem.hip_limit), low)
     high = np.where(hip, np.minimum(high, problem.hip_limit), high)
-    v_max = np.array([*[free] * NB, *kept.v_max[joints]])
+    v_max = np.array([*[free] * NB_FOLDED, *kept.v_max[joints]])
     tau_max = kept.tau_max[joints]
     ground = np.tile([-free, -free, 0.0], len(model.legs))
     unilateral = ("", "", "unilateral contact") * len(model.legs)
 
     q_limits = ("", "trunk height", *np.where(hip, "hip limit", "configuration limits"))
     q_low, q_high = np.array([-free, problem.trunk_height, *low]), np.array([free, free, *high])
-    v_limits = ("",) * NB + ("velocity limits",) * model.nl
+    v_limits = ("",) * NB_FOLDED + ("velocity limits",) * model.nl
     unbounded = np.full(model.nq, free)
     blocks = {
         "q": (q_low, q_high, q_limits),
@@ -162,7 +162,7 @@ def _motion(model: FoldedModel, phase: _Phase) -> list[Constraint]:
     constraints = []
     for k in range(len(phase.s)):
         forces = model.dynamics(phase.q[:, k], phase.v[:, k], phase.a[:, k], phase.lam[:, k])
-        motors = ca.vertcat(ca.SX(NB, 1), phase.tau[:, k])
+        motors = ca.vertcat(ca.SX(NB_FOLDED, 1), phase.tau[:, k])
         constraints.append(Constraint("dynamics", f"{phase.name}, node {k}", forces - motors))
     for k, length in enumerate(np.diff(phase.s[::2])):
         h, where = phase.duration * length, f"{phase.name}, interval {k}"
@@ -261,7 +261,7 @@ def _cost(problem: GaitProblem, phase: _Phase) -> ca.SX:
     """Cost (6) over a phase, by Simpson's rule; the kept legs count twice."""
     rate = 2.0 * (
         problem.torque_weight * ca.sum1(phase.tau**2)
-        + problem.velocity_weight * ca.sum1(phase.v[NB:, :] ** 2)
+        + problem.velocity_weight * ca.sum1(phase.v[NB_FOLDED:, :] ** 2)
     )  # (1, nodes)
     lengths = np.diff(phase.s[::2])
     weights = np.zeros(len(phase.s))

@@ -25,7 +25,7 @@ from .._typing import Array, BoolArray, IntArray
 from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..robot import JOINTS, Robot
-from .newton_euler import NB, FrameMotion, newton_euler
+from .newton_euler import NB_FOLDED, FrameMotion, newton_euler
 
 _MIRROR = {"L": "R", "R": "L"}
 
@@ -67,7 +67,7 @@ class FoldedModel:
     @property
     def nq(self) -> int:
         """Coordinates of the folded robot."""
-        return NB + self.nl
+        return NB_FOLDED + self.nl
 
     def joint_rows(self) -> IntArray:
         """Which of the robot's joints the folded robot keeps, shape (6,)."""
@@ -129,7 +129,7 @@ def fold(robot: Robot, contact: Contact = "rolling") -> FoldedModel:
             f"the legs {', '.join(robot.legs)} do not pair left and right; "
             "name them ..L and ..R in the RobotSpec"
         )
-    nq = NB + len(legs) * len(JOINTS)
+    nq = NB_FOLDED + len(legs) * len(JOINTS)
     q, v, a = (ca.SX.sym(name, nq) for name in "qva")
     lam = ca.SX.sym("lam", 3, len(legs))
     lever = np.array([0.0, 0.0, -robot.foot_radius if contact == "rolling" else 0.0])

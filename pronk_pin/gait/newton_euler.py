@@ -15,7 +15,7 @@ import numpy as np
 from .._typing import Array
 from ..robot import JOINTS, Robot
 
-NB = 2
+NB_FOLDED = 2
 """Coordinates of the trunk: x and z."""
 
 
@@ -74,11 +74,11 @@ def newton_euler(
         The forces that must act along each coordinate (8), and the motion of the feet.
     """
     q, v, a = state
-    trunk = _planar(q[:NB], v[:NB], a[:NB])
+    trunk = _planar(q[:NB_FOLDED], v[:NB_FOLDED], a[:NB_FOLDED])
     on_trunk = robot.model.inertias[1].mass * (trunk.acceleration - gravity)
     torques, feet = [], []
     for i, leg in enumerate(legs):
-        rows = slice(NB + i * len(JOINTS), NB + (i + 1) * len(JOINTS))
+        rows = slice(NB_FOLDED + i * len(JOINTS), NB_FOLDED + (i + 1) * len(JOINTS))
         joints = (q[rows], v[rows], a[rows])
         force, torque, foot = _leg(robot, leg, trunk, joints, lam[:, i], gravity, lever)
         on_trunk = on_trunk + 2.0 * force  # the leg and its mirror image

@@ -17,7 +17,7 @@ from . import bezier
 from .collocation import PHASES, node_phases, transcribe
 from .folded_model import FoldedModel, fold
 from .gait import Gait, GaitPhase, Motion
-from .newton_euler import NB
+from .newton_euler import NB_FOLDED
 from .problem import GaitProblem
 from .transcription import Transcription, Violation
 
@@ -226,7 +226,7 @@ def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
         v = np.gradient(q, s * duration, axis=0)
         values[f"{name}.q"], values[f"{name}.v"] = q, v
         values[f"{name}.a"] = np.gradient(v, s * duration, axis=0)
-        values[f"{name}.tau"] = np.zeros((len(s), q.shape[1] - NB))
+        values[f"{name}.tau"] = np.zeros((len(s), q.shape[1] - NB_FOLDED))
         values[f"{name}.duration"] = np.array([duration])
         start += problem.speed * duration
     push = robot.mass * robot.gravity * (stance + flight) / stance / len(robot.legs)
@@ -243,14 +243,14 @@ def _unfolded(model: FoldedModel, values: dict[str, Array], name: str) -> Motion
 
     def rates(folded: Array) -> Array:
         whole = np.zeros((n, robot.nv))
-        whole[:, [0, 2]] = folded[:, :NB]
-        whole[:, robot.nv - robot.nu :] = model.unfold_joints(folded[:, NB:])
+        whole[:, [0, 2]] = folded[:, :NB_FOLDED]
+        whole[:, robot.nv - robot.nu :] = model.unfold_joints(folded[:, NB_FOLDED:])
         return whole
 
     position = np.stack([q[:, 0], np.zeros(n), q[:, 1]], axis=-1)
     return Motion(
         t=float(values[f"{name}.duration"][0, 0]) * node_phases(n // 2),
-        q=robot.q_from_base(position, model.unfold_joints(q[:, NB:])),
+        q=robot.q_from_base(position, model.unfold_joints(q[:, NB_FOLDED:])),
         v=rates(v),
         a=rates(a),
         tau=model.unfold_joints(tau),

@@ -5,7 +5,7 @@ Colours are those of Okabe and Ito, which readers with any colour vision tell ap
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -173,9 +173,9 @@ def _joint_curves(strides: xr.Dataset, joint: str) -> tuple[Array, Array]:
     return planned - strides["error"].sel(joint=joint).to_numpy(), planned
 
 
-def _known(controllers: object) -> list[str]:
+def _known(controllers: Iterable[str]) -> list[str]:
     """Controllers in the order of the legend."""
-    names = set(controllers)  # type: ignore[call-overload]
+    names = set(controllers)
     return [name for name in LABELS if name in names]
 
 

@@ -47,16 +47,12 @@ def practice_scene(
     robot = load_robot(experiment.robot)
     gait = load_library(experiment.robot).at(float(speeds[index]))
     mine = _window(strides.isel(speed=index))
-    # The replay's robot is the simulation's; its clock starts with the first stride shown.
-    mine = mine.assign(start=mine["start"] - mine["start"][0])
-    switch = mine["stride"].to_numpy()[mine["learning"].to_numpy() == 1]
-    began = f"; learning starts after {_elapsed(mine, int(switch[0])):.1f} s" if switch.size else ""
+    mine = mine.assign(start=mine["start"] - mine["start"][0])  # the scene's clock starts at 0
+    learned = mine["start"].to_numpy()[mine["learning"].to_numpy() == 1]
+    began = f"; learning starts after {learned[0]:.1f} s" if learned.size else ""
     return Scene(
         robot,
-        [
-            _measured(robot, mine, controller),
-            _planned(robot, mine, gait),
-        ],
+        [_measured(robot, mine, controller), _planned(robot, mine, gait)],
         title=f"{robot.name.upper()} pronking at {gait.speed:g} m/s",
         caption=f"{controller}, scenario {strides.attrs['scenario']}{began}",
     )
@@ -71,10 +67,6 @@ def _window(strides: xr.Dataset) -> xr.Dataset:
     first = learning[0] - BEFORE if learning.size else count - BEFORE - AFTER
     first = max(int(first), 0)
     return strides.isel(stride=slice(first, min(first + BEFORE + AFTER, count)))
-
-
-def _elapsed(strides: xr.Dataset, stride: int) -> float:
-    return float(strides["start"].sel(stride=stride))
 
 
 def _clock(strides: xr.Dataset, k: int) -> tuple[Array, Array]:

@@ -10,7 +10,6 @@ import xarray as xr
 
 from pronk_pin.compare import (
     DEFAULT_CONTROLLERS,
-    PAPER_SPEEDS,
     Experiment,
     Results,
     Schedule,
@@ -20,6 +19,7 @@ from pronk_pin.compare import (
 from pronk_pin.compare.experiment import torque_library
 from pronk_pin.control import phase_grid
 from pronk_pin.errors import InvalidInput, PronkError
+from pronk_pin.gait import SPEEDS
 
 SHORT = Schedule(startup=0.1, practice=1.0, learning=0.5)
 
@@ -28,7 +28,7 @@ def test_the_default_is_the_papers_speeds_under_five_controllers() -> None:
     experiment = Experiment()
     assert len(experiment.speeds) == 14
     assert (experiment.speeds[0], experiment.speeds[-1]) == (-0.5, 0.8)
-    assert experiment.speeds == PAPER_SPEEDS
+    assert experiment.speeds == SPEEDS
     assert sorted(cell.controller for cell in experiment.cells()) == sorted(DEFAULT_CONTROLLERS)
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pronk_pin.compare import PAPER_SPEEDS
 from pronk_pin.compare.paper import table_1
+from pronk_pin.gait import SPEEDS
 
 
 def test_the_table_has_the_papers_14_speeds_for_each_joint_and_controller() -> None:
     table = table_1()
     assert len(table) == 14 * 2 * 2
     for _, rows in table.groupby(["joint", "controller"]):
-        np.testing.assert_allclose(rows["speed"], PAPER_SPEEDS)
+        np.testing.assert_allclose(rows["speed"], SPEEDS)
 
 
 @pytest.mark.parametrize("joint", ["calf", "thigh"])

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin.gait.folded_model import FoldedModel, fold
-from pronk_pin.gait.newton_euler import NB
+from pronk_pin.gait.newton_euler import NB_FOLDED
 from pronk_pin.robot import Robot
 
 KEPT = [0, 2, 6, 7, 8, 12, 13, 14]
@@ -29,13 +29,13 @@ def expansion(folded: FoldedModel) -> np.ndarray:
     """Matrix from folded to whole-robot velocities, shape (18, 8)."""
     matrix = np.zeros((folded.robot.nv, folded.nq))
     matrix[0, 0] = matrix[2, 1] = 1.0
-    matrix[6:, NB:] = folded.unfold_joints(np.eye(folded.nl)).T
+    matrix[6:, NB_FOLDED:] = folded.unfold_joints(np.eye(folded.nl)).T
     return matrix
 
 
 def unfold(folded: FoldedModel, q: np.ndarray) -> np.ndarray:
     position = np.array([q[0], 0.0, q[1]])
-    return folded.robot.q_from_base(position, folded.unfold_joints(q[NB:]))
+    return folded.robot.q_from_base(position, folded.unfold_joints(q[NB_FOLDED:]))
 
 
 def lowest_points(folded: FoldedModel, q, v, a):
