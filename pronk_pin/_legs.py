@@ -50,13 +50,18 @@ def leg_geometry(robot: Robot) -> LegGeometry:
     """Offsets of the legs, read from the model's joint placements.
 
     Raises:
-        InvalidInput: The joints are not x, y, y in parallel frames: the closed form does not hold.
+        InvalidInput: The legs have not three joints about x, y, y in parallel frames, or there are
+            joints besides: the closed form does not hold.
     """
     model = robot.model
+    if len(robot.spec.joints) != len(JOINTS) or robot.joint_names != robot.spec.joint_names:
+        raise InvalidInput(
+            f"{robot.name}: closed-form leg kinematics needs legs of three joints and no others, "
+            f"not {', '.join(robot.joint_names)}"
+        )
     offsets: dict[str, list[Array]] = {part: [] for part in (*JOINTS, "foot")}
     for leg, foot_id in zip(robot.legs, robot.foot_ids, strict=True):
-        for joint in JOINTS:
-            name = robot.spec.joint_pattern.format(leg=leg, joint=joint)
+        for joint, name in zip(JOINTS, robot.spec.leg_joints(leg), strict=True):
             joint_id = model.getJointId(name)
             placement = model.jointPlacements[joint_id]
             kind = model.joints[joint_id].shortname().removeprefix("JointModel")

@@ -21,10 +21,7 @@ import numpy as np
 from ._state import as_array, as_q
 from ._typing import Array, IntArray
 from .errors import InvalidInput
-from .robot import JOINTS, Robot
-
-PAPER_LEGS = ("FR", "FL", "RR", "RL")
-"""Order of the legs in the paper, section II.A."""
+from .robot import Robot
 
 
 class MujocoState(NamedTuple):
@@ -144,8 +141,23 @@ def rotation_matrix(quaternion: Array) -> Array:
 
 
 def _paper_names(robot: Robot) -> tuple[str, ...]:
-    pattern = robot.spec.joint_pattern
-    return tuple(pattern.format(leg=leg, joint=joint) for leg in PAPER_LEGS for joint in JOINTS)
+    """The joints in the paper's order of legs: front right, front left, rear right, rear left.
+
+    Which leg is where is read from the model, so that HR of Solo12 takes the place of RR.
+    """
+    hips = (robot.model.getJointId(robot.spec.leg_joints(leg)[0]) for leg in robot.legs)
+    places = (robot.model.jointPlacements[hip].translation for hip in hips)
+    by_place = {
+        (bool(x < 0.0), bool(y > 0.0)): robot.spec.leg_joints(leg)
+        for leg, (x, y, _) in zip(robot.legs, places, strict=True)
+    }
+    names = tuple(name for place in sorted(by_place) for name in by_place[place])
+    if len(by_place) != 4 or len(names) != robot.nu:
+        raise InvalidInput(
+            f"{robot.name}: the paper's order is that of two front and two rear legs and no other "
+            "joints; this robot has no such order"
+        )
+    return names
 
 
 def _rotate(rotation: Array, vector: Array) -> Array:

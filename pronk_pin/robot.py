@@ -23,7 +23,7 @@ from ._typing import Array
 from .errors import FileProblem, InvalidInput, UnknownName
 
 JOINTS = ("hip", "thigh", "calf")
-"""Joints of a leg, from the trunk down."""
+"""Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
 
 NB, NL = 6, 12
 """Velocities of the floating base, and actuated joints of a robot with four legs of three."""
@@ -33,32 +33,52 @@ _DATA_DISTRIBUTION = "example-robot-data"
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """Which names of a URDF play which part in a quadruped.
+    """Which names of a URDF play which part in a legged robot.
 
     Attributes:
         name: Short name, as on the command line.
         urdf: Path of the URDF: absolute, or relative to the `robots` folder of example-robot-data.
         base_link: Link of the trunk.
-        legs: Legs in Pinocchio's order.
-        joint_pattern: Name of a joint, with `{leg}` and `{joint}` (hip, thigh, calf).
+        legs: Legs in Pinocchio's order, which is alphabetical.
+        joints: What the URDF calls a leg's joints, from the trunk down. Closed-form leg kinematics
+            and the gaits need three: hip, thigh and calf.
+        joint_pattern: Name of a joint, with `{leg}` and `{joint}`.
         foot_pattern: Name of the foot's frame, with `{leg}`.
-        standing: Hip, thigh and calf angle of the standing posture [rad], the same for each leg.
+        standing: Joint angles of the standing posture [rad]: of one leg, the same for each, or of
+            all legs one after the other.
+        foot_radius: Radius of the spherical feet [m]; None to read it from the collision sphere
+            in the URDF.
     """
 
     name: str
     urdf: str
     base_link: str = "trunk"
     legs: tuple[str, ...] = ("FL", "FR", "RL", "RR")
+    joints: tuple[str, ...] = JOINTS
     joint_pattern: str = "{leg}_{joint}_joint"
     foot_pattern: str = "{leg}_foot"
-    standing: tuple[float, float, float] = (0.0, 0.9, -1.8)
+    standing: tuple[float, ...] = (0.0, 0.9, -1.8)
+    foot_radius: float | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.standing) not in (len(self.joints), len(self.joint_names)):
+            raise InvalidInput(
+                f"standing has {len(self.standing)} angles; give {len(self.joints)}, for the "
+                f"joints of one leg, or {len(self.joint_names)}, for all legs"
+            )
+        if self.foot_radius is not None and not 0.0 <= self.foot_radius < float("inf"):
+            raise InvalidInput(
+                f"foot_radius={self.foot_radius}; give a length in metres, 0 for point feet"
+            )
+
+    def leg_joints(self, leg: str) -> tuple[str, ...]:
+        """Names of a leg's joints, from the trunk down."""
+        return tuple(self.joint_pattern.format(leg=leg, joint=joint) for joint in self.joints)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """The twelve joints, by leg."""
-        return tuple(
-            self.joint_pattern.format(leg=leg, joint=joint) for leg in self.legs for joint in JOINTS
-        )
+        """The joints of the legs, by leg."""
+        return tuple(name for leg in self.legs for name in self.leg_joints(leg))
 
     @property
     def foot_names(self) -> tuple[str, ...]:
@@ -66,13 +86,39 @@ class RobotSpec:
         return tuple(self.foot_pattern.format(leg=leg) for leg in self.legs)
 
 
-ROBOTS = {spec.name: spec for spec in (RobotSpec("a1", "a1_description/urdf/a1.urdf"),)}
+ROBOTS = {
+    spec.name: spec
+    for spec in (
+        RobotSpec("a1", "a1_description/urdf/a1.urdf"),
+        RobotSpec("go1", "go1_description/urdf/go1.urdf"),
+        RobotSpec(
+            "go2",
+            "go2_description/urdf/go2.urdf",
+            base_link="base",
+            # The feet are meshes; half their extent fore and aft, 45.3 mm, of foot_convex.stl.
+            foot_radius=0.0227,
+        ),
+        RobotSpec(
+            "solo12",
+            "solo_description/robots/solo12.urdf",
+            base_link="base_link",
+            legs=("FL", "FR", "HL", "HR"),
+            joints=("HAA", "HFE", "KFE"),
+            joint_pattern="{leg}_{joint}",
+            foot_pattern="{leg}_FOOT",
+            # "straight_standing" of solo.srdf: knees point towards each other.
+            standing=(0.0, 0.8, -1.6) * 2 + (0.0, -0.8, 1.6) * 2,
+            # The feet are meshes: discs of 32 mm, of solo_foot.stl.
+            foot_radius=0.016,
+        ),
+    )
+}
 """Robots known by name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A quadruped: Pinocchio's model, and the names and numbers that everything else needs.
+    """A legged robot: Pinocchio's model, and the names and numbers that everything else needs.
 
     Attributes:
         spec: The names the robot was built from.
@@ -95,17 +141,17 @@ class Robot:
         """Short name of the robot."""
         return self.spec.name
 
-    @property
+    @cached_property
     def nq(self) -> int:
         """Size of q."""
         return int(self.model.nq)
 
-    @property
+    @cached_property
     def nv(self) -> int:
         """Size of v."""
         return int(self.model.nv)
 
-    @property
+    @cached_property
     def nu(self) -> int:
         """Number of motors."""
         return self.nv - NB
@@ -115,10 +161,10 @@ class Robot:
         """Legs in the order of q."""
         return self.spec.legs
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """Joints in the order of q."""
-        return self.spec.joint_names
+        """Joints in the order of q: those of the legs, and any others the URDF has."""
+        return tuple(self.model.names[2:])
 
     @property
     def foot_names(self) -> tuple[str, ...]:
@@ -168,8 +214,9 @@ class Robot:
     @cached_property
     def standing(self) -> Array:
         """Standing posture with the feet on the ground z = 0, shape (19,)."""
-        q = pin.neutral(self.model)
-        q[-self.nu :] = np.tile(self.spec.standing, len(self.legs))
+        q, names = pin.neutral(self.model), self.spec.joint_names
+        angles = np.resize(self.spec.standing, len(names))
+        q[[NB + 1 + self.joint_names.index(name) for name in names]] = angles
         pin.framesForwardKinematics(self.model, self.data, q)
         lowest = min(self.data.oMf[foot].translation[2] for foot in self.foot_ids)
         q[2] = self.foot_radius - lowest
@@ -201,7 +248,7 @@ def load_robot(robot: str | RobotSpec = "a1") -> Robot:
     """Load a robot by its short name, or from a specification of your own.
 
     Args:
-        robot: "a1", or a `RobotSpec`.
+        robot: "a1", "go1", "go2" or "solo12", or a `RobotSpec`.
 
     Raises:
         UnknownName: There is no robot of that name.
@@ -220,40 +267,54 @@ def _load(spec: RobotSpec) -> Robot:
     path, package_dir = _locate(spec.urdf)
     try:
         model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
-        geometry = pin.buildGeomFromUrdf(
-            model, str(path), pin.GeometryType.COLLISION, package_dirs=[str(package_dir)]
-        )
         document = ElementTree.parse(path).getroot()
     except (ValueError, RuntimeError, ElementTree.ParseError) as error:
         raise FileProblem(path, f"not a usable URDF ({error})", "check the file") from error
     model.name = spec.name
-    joints = tuple(name for name in model.names[2:])
-    if joints != spec.joint_names:
-        raise InvalidInput(
-            f"{path.name}: its joints are {', '.join(joints)}; the specification expects "
-            f"{', '.join(spec.joint_names)}; adapt joint_pattern and legs of the RobotSpec"
-        )
-    missing = [name for name in spec.foot_names if not model.existFrame(name)]
-    if missing:
-        raise InvalidInput(f"{path.name} has no frame {missing[0]}; adapt foot_pattern")
-    order = [element.get("name", "") for element in document.iter("joint")]
+    _check_names(spec, model, path)
+    radius = _foot_radius(document, spec) if spec.foot_radius is None else spec.foot_radius
+    order = [element.get("name", "") for element in document.findall("joint")]
+    joints = set(model.names[2:])
     return Robot(
         spec=spec,
         urdf_path=path,
         package_dir=package_dir,
         model=model,
-        foot_radius=_foot_radius(geometry, model, spec),
-        urdf_joint_names=tuple(name for name in order if name in spec.joint_names),
+        foot_radius=radius,
+        urdf_joint_names=tuple(name for name in order if name in joints),
     )
 
 
-def _foot_radius(geometry: pin.GeometryModel, model: pin.Model, spec: RobotSpec) -> float:
-    """Radius of the feet's collision spheres."""
-    first = int(model.getFrameId(spec.foot_names[0]))
-    for item in geometry.geometryObjects:
-        if item.parentFrame == first and hasattr(item.geometry, "radius"):
-            return float(item.geometry.radius)
-    raise InvalidInput(f"{spec.name}: foot {spec.foot_names[0]} has no collision sphere")
+def _check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:
+    """The model has what the specification names, one angle a joint."""
+    joints = list(model.names[2:])
+    if [name for name in joints if name in spec.joint_names] != list(spec.joint_names):
+        raise InvalidInput(
+            f"{path.name}: its joints are {', '.join(joints)}; the specification expects "
+            f"{', '.join(spec.joint_names)}; adapt joints, joint_pattern and legs of the RobotSpec"
+        )
+    for name, joint in zip(joints, model.joints[2:], strict=True):
+        if joint.nq != 1:
+            raise InvalidInput(
+                f"{path.name}: joint {name} has no limits ({joint.shortname()}), so Pinocchio "
+                "writes its angle as a cosine and a sine; make it a revolute joint with limits"
+            )
+    for name in spec.foot_names:
+        if not model.existFrame(name):
+            raise InvalidInput(f"{path.name} has no frame {name}; adapt foot_pattern")
+    if not model.existFrame(spec.base_link):
+        raise InvalidInput(f"{path.name} has no link {spec.base_link}; adapt base_link")
+
+
+def _foot_radius(document: ElementTree.Element, spec: RobotSpec) -> float:
+    """Radius of the first foot's collision sphere [m]."""
+    foot = spec.foot_names[0]
+    sphere = document.find(f"./link[@name='{foot}']/collision/geometry/sphere")
+    if sphere is None:
+        raise InvalidInput(
+            f"{spec.name}: foot {foot} has no collision sphere; give foot_radius in the RobotSpec"
+        )
+    return float(sphere.get("radius", "nan"))
 
 
 def _locate(urdf: str) -> tuple[Path, Path]:

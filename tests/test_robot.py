@@ -53,7 +53,9 @@ def test_a_robot_is_loaded_once(robot: Robot) -> None:
 
 
 def test_an_unknown_robot_is_answered_with_the_known_ones() -> None:
-    with pytest.raises(UnknownName, match="unknown robot 'spot'; choose one of: a1"):
+    with pytest.raises(
+        UnknownName, match="unknown robot 'spot'; choose one of: a1, go1, go2, solo12"
+    ):
         load_robot("spot")
 
 
@@ -78,20 +80,65 @@ def test_a_damaged_urdf_is_named(tmp_path: Path) -> None:
         load_robot(RobotSpec("broken", str(path)))
 
 
-def test_feet_need_a_sphere(robot: Robot, tmp_path: Path) -> None:
+def test_feet_without_a_sphere_need_a_radius(robot: Robot, tmp_path: Path) -> None:
     path = tmp_path / "footless.urdf"
     text = robot.urdf_path.read_text()
     path.write_text(text.replace('<sphere radius="0.02"/>', '<box size="0.02 0.02 0.02"/>'))
-    with pytest.raises(InvalidInput, match="no collision sphere"):
-        load_robot(RobotSpec("footless", str(path)))
+    spec = RobotSpec("footless", str(path))
+    with pytest.raises(InvalidInput, match="no collision sphere; give foot_radius"):
+        load_robot(spec)
+    assert load_robot(replace(spec, foot_radius=0.01)).foot_radius == 0.01
+
+
+def test_a_joint_without_limits_is_explained(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "turning.urdf"
+    limited, turning = (
+        f'FR_hip_joint" type="{kind}"' for kind in ("revolute", "continuous")
+    )
+    path.write_text(robot.urdf_path.read_text().replace(limited, turning))
+    with pytest.raises(InvalidInput, match="FR_hip_joint has no limits"):
+        load_robot(RobotSpec("turning", str(path)))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_robot_stands_over_its_feet(name: str) -> None:
+    robot = load_robot(name)
+    assert (robot.q_min <= robot.standing[7:]).all()
+    assert (robot.standing[7:] <= robot.q_max).all()
+    feet = foot_positions(robot, robot.standing)
+    np.testing.assert_allclose(feet[:, 2], robot.foot_radius)
+    middle = pin.centerOfMass(robot.model, robot.data, robot.standing)
+    assert (feet[:, :2].min(axis=0) < middle[:2]).all()
+    assert (middle[:2] < feet[:, :2].max(axis=0)).all()
+
+
+def test_a_robot_with_other_names_and_joints_is_read_too() -> None:
+    bolt = load_robot(
+        RobotSpec(
+            "bolt",
+            "bolt_description/robots/bolt.urdf",
+            base_link="base_link",
+            legs=("FL", "FR"),
+            joints=("HAA", "HFE", "KFE"),
+            joint_pattern="{leg}_{joint}",
+            foot_pattern="{leg}_FOOT",
+            standing=(0.0, 0.8, -1.6),
+            foot_radius=0.01,
+        )
+    )
+    assert (bolt.nq, bolt.nv, bolt.nu) == (13, 12, 6)
+    assert foot_positions(bolt, bolt.standing).shape == (2, 3)
 
 
 @pytest.mark.parametrize(
     ("change", "remedy"),
     [
-        ({"joint_pattern": "{leg}-{joint}"}, "adapt joint_pattern"),
+        ({"joint_pattern": "{leg}-{joint}"}, "adapt joints, joint_pattern"),
         ({"legs": ("FR", "FL", "RL", "RR")}, "legs of the RobotSpec"),
         ({"foot_pattern": "{leg}_toe"}, "adapt foot_pattern"),
+        ({"base_link": "torso"}, "adapt base_link"),
+        ({"standing": (0.9, -1.8)}, "standing has 2 angles; give 3, .* or 12"),
+        ({"foot_radius": -0.02}, "give a length in metres"),
     ],
 )
 def test_a_specification_that_does_not_fit_is_explained(

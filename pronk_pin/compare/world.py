@@ -120,7 +120,7 @@ def _add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
             geom.contype, geom.conaffinity = 0, 1  # the robot meets the floor, not itself
             geom.solref, geom.friction, geom.condim = contact.values()
     for leg, foot in zip(robot.legs, robot.foot_names, strict=True):
-        calf = spec.joint(robot.spec.joint_pattern.format(leg=leg, joint="calf")).parent
+        calf = spec.joint(robot.spec.leg_joints(leg)[-1]).parent
         sphere = next(g for g in calf.geoms if g.type == mujoco.mjtGeom.mjGEOM_SPHERE)
         sphere.name = foot
         force = mujoco.mjtConDataField.mjCONDATA_FORCE

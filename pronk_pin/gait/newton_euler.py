@@ -165,8 +165,8 @@ def _rotation(axis: Array, angle: ca.SX) -> ca.SX:
 def _links(robot: Robot, leg: str) -> list[_Link]:
     """The links of a leg from the trunk down."""
     links = []
-    for joint in JOINTS:
-        i = robot.model.getJointId(robot.spec.joint_pattern.format(leg=leg, joint=joint))
+    for name in robot.spec.leg_joints(leg):
+        i = robot.model.getJointId(name)
         placement, inertia = robot.model.jointPlacements[i], robot.model.inertias[i]
         links.append(
             _Link(

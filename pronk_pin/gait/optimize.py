@@ -13,6 +13,7 @@ import numpy as np
 
 from .._typing import Array
 from ..errors import GaitNotFound, InvalidInput
+from ..robot import NB
 from . import bezier
 from .collocation import PHASES, node_phases, transcribe
 from .folded_model import FoldedModel, fold
@@ -212,7 +213,8 @@ def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
     Returns:
         The unknowns of the transcription, each (nodes, rows).
     """
-    robot, legs = problem.robot, len(fold(problem.robot, problem.contact).legs)
+    robot, model = problem.robot, fold(problem.robot, problem.contact)
+    legs, standing = len(model.legs), robot.standing[NB + 1 :][model.joint_rows()]
     stance, flight = 0.5 * sum(problem.stance), problem.flight[0]
     rise = robot.gravity * flight**2 / 8
     dip = robot.gravity * flight * stance / 8  # as deep as the speed at take-off asks
@@ -222,7 +224,7 @@ def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
         height = rise if name == "flight" else -dip
         z = problem.apex - rise + height * 4 * s * (1 - s)
         x = start + problem.speed * duration * s
-        q = np.column_stack([x, z, np.tile(robot.spec.standing, (len(s), legs))])
+        q = np.column_stack([x, z, np.tile(standing, (len(s), 1))])
         v = np.gradient(q, s * duration, axis=0)
         values[f"{name}.q"], values[f"{name}.v"] = q, v
         values[f"{name}.a"] = np.gradient(v, s * duration, axis=0)
