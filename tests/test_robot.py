@@ -92,9 +92,7 @@ def test_feet_without_a_sphere_need_a_radius(robot: Robot, tmp_path: Path) -> No
 
 def test_a_joint_without_limits_is_explained(robot: Robot, tmp_path: Path) -> None:
     path = tmp_path / "turning.urdf"
-    limited, turning = (
-        f'FR_hip_joint" type="{kind}"' for kind in ("revolute", "continuous")
-    )
+    limited, turning = (f'FR_hip_joint" type="{kind}"' for kind in ("revolute", "continuous"))
     path.write_text(robot.urdf_path.read_text().replace(limited, turning))
     with pytest.raises(InvalidInput, match="FR_hip_joint has no limits"):
         load_robot(RobotSpec("turning", str(path)))
