@@ -80,34 +80,40 @@ def contact_radius(robot: Robot, contact: str) -> float:
     Raises:
         UnknownName: There is no such contact.
     """
+    if contact == "point":
+        return 0.0
     known_name("contact", contact, CONTACTS)
-    return robot.foot_radius if contact == "rolling" else 0.0
+    return robot.foot_radius
 
 
 def jacobian_at(robot: Robot, q: Array, legs: Sequence[int], radius: float) -> Array:
     """`contact_jacobian` of checked arguments, with the legs by index."""
-    model, data = robot.model, robot.data
+    model, data, ids = robot.model, robot.data, robot.foot_ids
     pin.computeJointJacobians(model, data, q)
-    jacobian = np.empty((3 * len(legs), robot.nv))
-    for row, leg in enumerate(legs):
-        foot = pin.getFrameJacobian(model, data, robot.foot_ids[leg], pin.LOCAL_WORLD_ALIGNED)
-        jacobian[3 * row : 3 * row + 3] = foot[:3]
+    whole = [pin.getFrameJacobian(model, data, ids[leg], pin.LOCAL_WORLD_ALIGNED) for leg in legs]
+    if not whole:
+        return np.empty((0, robot.nv))
+    jacobian = np.concatenate([foot[:3] for foot in whole])
+    if radius:
         # w x (0, 0, -r) = (-r w_y, r w_x, 0)
-        jacobian[3 * row] -= radius * foot[4]
-        jacobian[3 * row + 1] += radius * foot[3]
+        jacobian[0::3] -= [radius * foot[4] for foot in whole]
+        jacobian[1::3] += [radius * foot[3] for foot in whole]
     return jacobian
 
 
 def bias_at(robot: Robot, q: Array, v: Array, legs: Sequence[int], radius: float) -> Array:
     """`contact_bias` of checked arguments, with the legs by index."""
-    model, data = robot.model, robot.data
-    pin.forwardKinematics(model, data, q, v, np.zeros(robot.nv))
-    bias = np.empty(3 * len(legs))
-    for row, leg in enumerate(legs):
-        foot = robot.foot_ids[leg]
-        classical = pin.getFrameClassicalAcceleration(model, data, foot, pin.LOCAL_WORLD_ALIGNED)
-        bias[3 * row : 3 * row + 3] = classical.linear
-        angular = classical.angular
-        bias[3 * row] -= radius * angular[1]
-        bias[3 * row + 1] += radius * angular[0]
+    model, data, ids = robot.model, robot.data, robot.foot_ids
+    pin.forwardKinematics(model, data, q, v, robot.at_rest)
+    whole = [
+        pin.getFrameClassicalAcceleration(model, data, ids[leg], pin.LOCAL_WORLD_ALIGNED)
+        for leg in legs
+    ]
+    if not whole:
+        return np.empty(0)
+    bias = np.concatenate([foot.linear for foot in whole])
+    if radius:
+        angular = np.array([foot.angular for foot in whole])
+        bias[0::3] -= radius * angular[:, 1]
+        bias[1::3] += radius * angular[:, 0]
     return bias

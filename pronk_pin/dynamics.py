@@ -24,42 +24,59 @@ from ._contacts import (
     contact_radius,
     jacobian_at,
 )
-from ._stance import Baumgarte, contact_response, stance_accelerations
-from ._state import as_array, as_one, as_q, as_state, leg_indices
-from ._typing import Array, BoolArray
+from ._derivatives import (
+    FlightDerivatives,
+    StanceDerivatives,
+    flight_derivatives_at,
+    stance_derivatives_at,
+)
+from ._simulate import PhaseProblem, PhaseSimulation, Torque, integrate, sampled_torque
+from ._stance import (
+    NO_GAINS,
+    Baumgarte,
+    Impact,
+    StanceDynamics,
+    contact_response,
+    point_stance,
+    stance_accelerations,
+)
+from ._state import as_array, as_one, as_state, leg_indices
+from ._terms import (
+    coriolis_matrix,
+    gravity,
+    mass_matrix,
+    nonlinear_effects,
+    quick_result,
+    selection_matrix,
+)
+from ._typing import Array
 from .errors import InvalidInput
 from .robot import NB, Robot
 
 __all__ = [
     "Baumgarte",
     "Contact",
+    "FlightDerivatives",
     "Impact",
+    "PhaseSimulation",
     "StanceDae",
+    "StanceDerivatives",
     "StanceDynamics",
     "contact_bias",
     "contact_jacobian",
     "coriolis_matrix",
+    "flight_derivatives",
     "flight_dynamics",
     "gravity",
     "impact",
     "mass_matrix",
     "nonlinear_effects",
     "selection_matrix",
+    "simulate_phase",
     "stance_dae",
+    "stance_derivatives",
     "stance_dynamics",
 ]
-
-
-class StanceDynamics(NamedTuple):
-    """Acceleration and contact forces in stance."""
-
-    a: Array
-    """Generalised acceleration, shape (..., 18)."""
-    lam: Array
-    """Contact forces in the world's axes, foot by foot [N], shape (..., 3 feet)."""
-    singular: BoolArray
-    """Whether the contacts do not determine the forces (straight legs, redundant feet), so that
-    lam is the damped least-squares answer, shape (...). The equations of motion hold even so."""
 
 
 class StanceDae(NamedTuple):
@@ -69,75 +86,6 @@ class StanceDae(NamedTuple):
     """[[M, -J^T], [J, 0]], shape (18 + 3 feet, 18 + 3 feet)."""
     rhs: Array
     """[S tau - H v - G, -sigma], shape (18 + 3 feet,)."""
-
-
-class Impact(NamedTuple):
-    """What a collision of feet with the ground does."""
-
-    v: Array
-    """Velocity after the impact, shape (18,)."""
-    impulse: Array
-    """Contact impulses in the world's axes, foot by foot [N s], shape (3 feet,)."""
-    singular: bool
-    """Whether the contacts do not determine the impulses, see `StanceDynamics.singular`."""
-
-
-def mass_matrix(robot: Robot, q: npt.ArrayLike) -> Array:
-    """Mass matrix M(q) of eq. (2), symmetric.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (19,).
-
-    Returns:
-        Shape (18, 18).
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
-    """
-    return np.array(pin.crba(robot.model, robot.data, as_one("q", as_q(robot, q))))
-
-
-def coriolis_matrix(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
-    """Coriolis and centrifugal matrix H(q, v) of eq. (2), shape (18, 18).
-
-    Arguments and errors are those of `nonlinear_effects`.
-    """
-    q, v = as_state(robot, q, v)
-    return np.array(pin.computeCoriolisMatrix(robot.model, robot.data, as_one("q", q), v))
-
-
-def gravity(robot: Robot, q: npt.ArrayLike) -> Array:
-    """Gravitational forces G(q) of eq. (2) [N, N m], shape (18,).
-
-    Arguments and errors are those of `mass_matrix`.
-    """
-    return np.array(
-        pin.computeGeneralizedGravity(robot.model, robot.data, as_one("q", as_q(robot, q)))
-    )
-
-
-def nonlinear_effects(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
-    """Bias forces H(q, v) v + G(q) of eq. (2) [N, N m].
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (19,).
-        v: Velocity, shape (18,).
-
-    Returns:
-        Shape (18,).
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
-    """
-    q, v = as_state(robot, q, v)
-    return np.array(pin.nonLinearEffects(robot.model, robot.data, as_one("q", q), v))
-
-
-def selection_matrix(robot: Robot) -> Array:
-    """Selection matrix S of eq. (2), which hands the motor torques to the joints, (18, 12)."""
-    return np.eye(robot.nv, robot.nu, k=-NB)
 
 
 def flight_dynamics(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.ArrayLike) -> Array:
@@ -155,13 +103,20 @@ def flight_dynamics(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.A
     Raises:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
     """
+    if np.ndim(tau) == 1:
+        force = np.zeros(robot.nv)
+        force[NB:] = as_array("tau", tau, robot.nu, ())
+        quick = quick_result(pin.aba, robot, 0, q, v, force)
+        if quick is not None:
+            return quick
     q, v = as_state(robot, q, v)
     tau = as_array("tau", tau, robot.nu, q.shape[:-1])
     force = np.concatenate([np.zeros((*tau.shape[:-1], NB)), tau], axis=-1)
     a = np.empty_like(v)
+    aba, model, data = pin.aba, robot.model, robot.data
     rows = (x.reshape(-1, x.shape[-1]) for x in (q, v, force, a))
     for q_row, v_row, force_row, out in zip(*rows, strict=True):
-        out[:] = pin.aba(robot.model, robot.data, q_row, v_row, force_row)
+        out[:] = aba(model, data, q_row, v_row, force_row)
     return a
 
 
@@ -193,21 +148,33 @@ def stance_dynamics(
         InvalidInput: A wrong shape, NaN, a quaternion that is not normalised, negative gains.
         UnknownName: There is no such leg or contact.
     """
+    legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
+    gains = NO_GAINS if baumgarte is None else _gains(baumgarte)
+    simple = bool(legs) and radius == 0.0 and gains == NO_GAINS
+    if simple and np.ndim(tau) == 1:
+        torque = as_array("tau", tau, robot.nu, ())
+        quick = point_stance(robot, legs).quick(q, v, torque)
+        if quick is not None:
+            return quick
     q, v = as_state(robot, q, v)
-    tau = as_array("tau", tau, robot.nu, q.shape[:-1])
-    legs = tuple(leg_indices(robot, feet))
-    radius = contact_radius(robot, contact)
-    given = (0.0, 0.0) if baumgarte is None else baumgarte
-    gains = Baumgarte(*as_array("baumgarte", given, 2, ()))
-    if min(gains) < 0.0:
-        raise InvalidInput(f"baumgarte={baumgarte}; both gains must be 0 or positive")
-    a, lam = np.empty_like(v), np.empty((*q.shape[:-1], 3 * len(legs)))
-    singular = np.zeros(q.shape[:-1], dtype=bool)
-    for row in np.ndindex(singular.shape):
-        a[row], lam[row], singular[row] = stance_accelerations(
-            robot, (q[row], v[row], tau[row]), legs, radius, gains
+    batch = q.shape[:-1]
+    tau = as_array("tau", tau, robot.nu, batch)
+    if not batch:
+        return stance_accelerations(robot, (q, v, tau), legs, radius, gains)
+    states = (q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), tau.reshape(-1, robot.nu))
+    n = len(states[0])
+    a, lam = np.empty((n, robot.nv)), np.empty((n, 3 * len(legs)))
+    singular = np.ones(n, dtype=bool)
+    if simple:
+        singular = point_stance(robot, legs).solve_all(*states, out=(a, lam))
+    for row in np.flatnonzero(singular):
+        one = stance_accelerations(
+            robot, (states[0][row], states[1][row], states[2][row]), legs, radius, gains
         )
-    return StanceDynamics(a, lam, singular)
+        a[row], lam[row], singular[row] = one
+    return StanceDynamics(
+        a.reshape(v.shape), lam.reshape(*batch, 3 * len(legs)), singular.reshape(batch)
+    )
 
 
 def stance_dae(
@@ -265,12 +232,131 @@ def impact(
             outside [0, 1].
         UnknownName: There is no such leg or contact.
     """
-    q, v = as_state(robot, q, v)
-    as_one("q", q)
     if not 0.0 <= restitution <= 1.0:
         raise InvalidInput(f"restitution={restitution}; choose a number from 0 to 1")
     legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
+    if legs and radius == 0.0:
+        quick = point_stance(robot, legs).quick_impact(q, v, restitution)
+        if quick is not None:
+            return quick
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
     jacobian = jacobian_at(robot, q, legs, radius)
     wanted = -(1.0 + restitution) * (jacobian @ v)
     impulse, change, singular = contact_response(robot, q, jacobian, wanted)
     return Impact(v + change, impulse, singular)
+
+
+def flight_derivatives(
+    robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.ArrayLike
+) -> FlightDerivatives:
+    """Derivatives of `flight_dynamics` by q, v and tau.
+
+    A derivative by q is by the small motion d of `pinocchio.integrate(model, q, d)`.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (19,).
+        v: Velocity, shape (18,).
+        tau: Motor torques [N m], shape (12,).
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    """
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
+    return flight_derivatives_at(robot, q, v, as_array("tau", tau, robot.nu, ()))
+
+
+def stance_derivatives(
+    robot: Robot,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    tau: npt.ArrayLike,
+    *,
+    feet: Iterable[str] | None = None,
+    contact: Contact = "point",
+) -> StanceDerivatives:
+    """Derivatives of `stance_dynamics`' acceleration and contact forces by q, v and tau.
+
+    A derivative by q is by the small motion d of `pinocchio.integrate(model, q, d)`.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (19,).
+        v: Velocity, shape (18,).
+        tau: Motor torques [N m], shape (12,).
+        feet: Legs in contact, in the order of lam; all if None, none if empty.
+        contact: "point" or "rolling", see `contact_jacobian`.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+        UnknownName: There is no such leg or contact.
+    """
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
+    state = (q, v, as_array("tau", tau, robot.nu, ()))
+    return stance_derivatives_at(
+        robot, state, leg_indices(robot, feet), contact_radius(robot, contact)
+    )
+
+
+def simulate_phase(
+    robot: Robot,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    tau: npt.ArrayLike | Torque,
+    *,
+    duration: float,
+    feet: Iterable[str] | None = None,
+    contact: Contact = "point",
+    baumgarte: tuple[float, float] | None = None,
+    samples: int = 101,
+    tolerance: float = 1e-10,
+) -> PhaseSimulation:
+    """Integrate flight or stance from a state under given torques, and report the drift.
+
+    The contacts neither slip nor open nor close: a phase has one set of feet. Touchdown is
+    `impact`, which also brings the feet to rest where the start has them moving.
+
+    Args:
+        robot: The robot.
+        q: Configuration at the start, shape (19,).
+        v: Velocity at the start, shape (18,).
+        tau: Motor torques [N m]: constant, shape (12,); samples at even times from start to end,
+            shape (m, 12), straight lines between; or a function of the time since the start [s].
+        duration: How long the phase lasts [s].
+        feet: Legs in contact; all if None, none if empty, which is flight.
+        contact: "point" or "rolling", see `contact_jacobian`.
+        baumgarte: Gains that pull drifting feet back, see `Baumgarte`; none if None.
+        samples: Number of samples returned, start and end included, at least 2.
+        tolerance: Relative and absolute tolerance of the integrator, DOP853.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, a quaternion that is not normalised, or a duration,
+            number of samples or tolerance that makes no sense.
+        UnknownName: There is no such leg or contact.
+        IntegrationFailed: The integrator could not reach the end.
+    """
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
+    if not 0.0 < duration < np.inf or samples < 2 or not 0.0 < tolerance < 1.0:
+        raise InvalidInput(
+            f"duration={duration}, samples={samples}, tolerance={tolerance}; give a positive "
+            "duration, 2 samples or more, and a tolerance between 0 and 1"
+        )
+    problem = PhaseProblem(
+        robot,
+        tau if callable(tau) else sampled_torque(robot, tau, duration),
+        leg_indices(robot, feet),
+        contact_radius(robot, contact),
+        NO_GAINS if baumgarte is None else _gains(baumgarte),
+    )
+    return integrate(problem, q, v, np.linspace(0.0, duration, samples), tolerance)
+
+
+def _gains(baumgarte: tuple[float, float]) -> Baumgarte:
+    gains = Baumgarte(*as_array("baumgarte", baumgarte, 2, ()).tolist())
+    if min(gains) < 0.0:
+        raise InvalidInput(f"baumgarte={baumgarte}; both gains must be 0 or positive")
+    return gains

@@ -80,6 +80,23 @@ def cannot_write(
     return FileProblem(path, f"cannot be written ({reason})", remedy)
 
 
+class IntegrationFailed(PronkError):
+    """A simulation that the integrator could not bring to its end.
+
+    Attributes:
+        reached: How far it came [s].
+        duration: How far it was to go [s].
+        reason: What the integrator said.
+    """
+
+    def __init__(self, reached: float, duration: float, reason: str) -> None:
+        self.reached, self.duration, self.reason = reached, duration, reason
+        super().__init__(
+            f"the simulation stopped at {reached:g} s of {duration:g} s ({reason}); the torques "
+            "may drive it into a singular posture: shorten the duration, or raise the tolerance"
+        )
+
+
 class GaitNotFound(PronkError):
     """The gait optimisation did not find a solution.
 

@@ -52,11 +52,18 @@ def foot_positions(robot: Robot, q: npt.ArrayLike) -> Array:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
     """
     q = as_q(robot, q)
-    positions = np.empty((*q.shape[:-1], len(robot.legs), 3))
-    for row in np.ndindex(q.shape[:-1]):
-        pin.framesForwardKinematics(robot.model, robot.data, q[row])
-        for leg, foot in enumerate(robot.foot_ids):
-            positions[(*row, leg)] = robot.data.oMf[foot].translation
+    model, data, ids = robot.model, robot.data, robot.foot_ids
+    placements = data.oMf
+
+    def feet(row: Array) -> list[Array]:
+        pin.framesForwardKinematics(model, data, row)
+        return [placements[foot].translation for foot in ids]
+
+    if q.ndim == 1:
+        return np.array(feet(q))
+    positions = np.empty((*q.shape[:-1], len(ids), 3))
+    for row, out in zip(q.reshape(-1, robot.nq), positions.reshape(-1, len(ids), 3), strict=True):
+        out[:] = feet(row)
     return positions
 
 
@@ -75,13 +82,18 @@ def foot_velocities(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
     """
     q, v = as_state(robot, q, v)
-    velocities = np.empty((*q.shape[:-1], len(robot.legs), 3))
-    model, data = robot.model, robot.data
-    for row in np.ndindex(q.shape[:-1]):
-        pin.forwardKinematics(model, data, q[row], v[row])
-        for leg, foot in enumerate(robot.foot_ids):
-            motion = pin.getFrameVelocity(model, data, foot, pin.LOCAL_WORLD_ALIGNED)
-            velocities[(*row, leg)] = motion.linear
+    model, data, ids, world = robot.model, robot.data, robot.foot_ids, pin.LOCAL_WORLD_ALIGNED
+
+    def feet(q_row: Array, v_row: Array) -> list[Array]:
+        pin.forwardKinematics(model, data, q_row, v_row)
+        return [pin.getFrameVelocity(model, data, foot, world).linear for foot in ids]
+
+    if q.ndim == 1:
+        return np.array(feet(q, v))
+    velocities = np.empty((*q.shape[:-1], len(ids), 3))
+    states = q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), velocities.reshape(-1, len(ids), 3)
+    for q_row, v_row, out in zip(*states, strict=True):
+        out[:] = feet(q_row, v_row)
     return velocities
 
 

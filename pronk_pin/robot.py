@@ -182,6 +182,13 @@ class Robot:
         return self.model.createData()
 
     @cached_property
+    def at_rest(self) -> Array:
+        """A velocity or acceleration of zero, shape (18,); read-only."""
+        zero = np.zeros(self.nv)
+        zero.flags.writeable = False
+        return zero
+
+    @cached_property
     def q_min(self) -> Array:
         """Lower joint limits [rad], shape (12,)."""
         return np.array(self.model.lowerPositionLimit[-self.nu :])
