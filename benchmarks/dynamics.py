@@ -126,11 +126,15 @@ class Bare:
         )
 
     def inverse_dynamics(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Forces by least squares of the base's equations, torques from the rest."""
+        """The forces that need the smallest torques, by their optimality conditions."""
         needed = pin.rnea(self.model, self.data, q, v, a)
         jacobian = self.jacobian(q)
-        lam = np.linalg.lstsq(jacobian[:, :6].T, needed[:6], rcond=None)[0]
-        return needed[6:] - jacobian[:, 6:].T @ lam
+        base, lever = jacobian[:, :6], jacobian[:, 6:]
+        hessian = lever @ lever.T + 1e-6 * np.eye(len(lever))
+        matrix = np.block([[hessian, base], [base.T, np.zeros((6, 6))]])
+        rhs = np.concatenate([lever @ needed[6:], needed[:6]])
+        lam = np.linalg.solve(matrix, rhs)[: len(lever)]
+        return needed[6:] - lever.T @ lam
 
 
 def singles(robot: Robot) -> dict[str, tuple[Call, Call]]:

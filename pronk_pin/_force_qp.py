@@ -1,7 +1,5 @@
 """Contact forces within friction cones and torque limits, by ProxQP.
 
-The unknowns y stack the contact forces lam, foot by foot, and the guide's forces w:
-
     minimise    |b_joints - lever lam|^2 + weight |lam|^2
     subject to  wrench y = b_base
                 |b_joints - lever lam| <= tau_max
@@ -13,38 +11,27 @@ diagonals and stays within it by 8 % elsewhere; it is its own mirror image about
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from proxsuite import proxqp
 
-from ._typing import Array
-
-FORCE_WEIGHT = 1e-6
-"""Cost of contact forces against joint torques [m^2]: small enough not to show, and it decides
-where straight legs leave the torques undecided."""
+from ._force_problem import ForceProblem, SaddlePoint
+from ._typing import Array, IntArray
+from .robot import NB
 
 _SIDES = 8
-_ACCURACY = 1e-10
+_ACCURACY = 1e-9
+"""Violation of cones and limits that passes [N, N m]; what it leaves of the base's equations is
+corrected afterwards."""
 _SLACK_WEIGHT = 1e3
 """Cost of violated base equations against joint torques, where they cannot be met."""
 _ITERATIONS = 100
 """Solvable problems take 1 to 25; ProxQP can spend its default of 10,000 on others."""
 _INFEASIBLE = 1e-8
 """ProxQP's default of 1e-4 takes some problems whose forces touch the cone for infeasible."""
-
-
-class ForceProblem(NamedTuple):
-    """What changes from one instant to the next; see the module's equations."""
-
-    lever: Array
-    """Torques that hold the contact forces [m], shape (12, 3 feet)."""
-    b_joints: Array
-    """Torques needed without contact [N m], shape (12,)."""
-    wrench: Array
-    """Wrench of unit forces on the trunk, shape (6, 3 feet + guides)."""
-    b_base: Array
-    """Wrench the trunk needs [N, N m], shape (6,)."""
+_WARM = {"mu_in": 1e-4, "mu_eq": 1e-6, "rho": 1e-8}
+"""Proximal parameters close to the exact problem: from the active set of the instant before they
+reach the next solution in two iterations; the defaults (0.1, 1e-3, 1e-6), safer from afar, take
+eleven."""
 
 
 def cone_sides(friction: float, feet: int) -> Array:
@@ -55,53 +42,81 @@ def cone_sides(friction: float, feet: int) -> Array:
     return np.kron(np.eye(feet), np.stack([np.cos(angle), np.sin(angle), height], axis=-1))
 
 
-class ForceQP:
-    """Solves one `ForceProblem` after another, each started from the one before.
+def constrained_forces(
+    problem: ForceProblem, conditions: SaddlePoint, rows: IntArray, friction: float, tau_max: Array
+) -> Array:
+    """Forces y within cones and limits at some instants of a trajectory, in their order.
+
+    Each QP starts from the solution of the one before. Where the base's equations cannot be met
+    they are violated least.
 
     Args:
-        feet: Number of feet in contact.
-        guides: Number of coordinates held by a guide.
+        problem: The problem of n instants.
+        conditions: Its optimality conditions without cones and limits.
+        rows: Instants to solve, shape (m,).
         friction: Coefficient of friction.
         tau_max: Torque limits [N m], shape (12,); infinite where there are none.
-    """
 
-    def __init__(self, feet: int, guides: int, friction: float, tau_max: Array) -> None:
-        self._forces, self._size = 3 * feet, 3 * feet + guides
-        self._tau_max = tau_max
-        self._cone = np.pad(cone_sides(friction, feet), ((0, 0), (0, guides)))
+    Returns:
+        Shape (m, 3 feet + guides).
+    """
+    chosen = ForceProblem(*(part[rows] for part in problem))
+    chain = _Chain(chosen, conditions.matrix[rows], conditions.rhs[rows], friction, tau_max)
+    forces = np.empty((len(rows), problem.size))
+    met = np.empty(len(rows), dtype=bool)
+    for k in range(len(rows)):
+        forces[k], met[k] = chain.solve(k)
+    rest = np.where(met[:, None], chosen.rest(forces), 0.0)
+    return forces + conditions.correction(rest, rows)
+
+
+class _Chain:
+    """The QPs of successive instants, each started from the one before."""
+
+    def __init__(
+        self, problem: ForceProblem, matrix: Array, rhs: Array, friction: float, tau_max: Array
+    ) -> None:
+        size, contacts = problem.size, problem.contacts
+        sides = cone_sides(friction, contacts // 3)
+        n, motors = problem.b_joints.shape
+        self._rows = np.zeros((n, len(sides) + motors, size))
+        self._rows[:, : len(sides), :contacts] = sides
+        self._rows[:, len(sides) :, :contacts] = problem.lever
+        self._upper = np.zeros(self._rows.shape[:2])
+        self._upper[:, len(sides) :] = problem.b_joints + tau_max
+        self._lower = np.full(self._rows.shape[:2], -np.inf)
+        self._lower[:, len(sides) :] = problem.b_joints - tau_max
+        self._hessian, self._gradient = matrix[:, :size, :size], -rhs[:, :size]
+        self._problem = problem
         self._warm: proxqp.dense.QP | None = None
 
-    def solve(self, problem: ForceProblem) -> Array:
-        """The forces y; where the base equations cannot be met, those that violate them least."""
-        terms = self._terms(problem)
+    def solve(self, k: int) -> tuple[Array, bool]:
+        """Forces of instant k, and whether they meet the base's equations."""
+        terms = self._terms(k)
         if self._warm is not None:
-            self._warm.update(**terms)
+            self._warm.update(**terms, **_WARM)
             if _solved(self._warm):
-                return np.array(self._warm.results.x)
+                return self._warm.results.x, True
         # A start from far away misleads the solver more than none: a failure begins afresh.
         fresh = _new_qp(terms)
         if _solved(fresh):
             self._warm = fresh
-            return np.array(fresh.results.x)
+            return fresh.results.x, True
         self._warm = None
         elastic = _new_qp(_with_slack(terms))
         elastic.solve()
-        return np.array(elastic.results.x[: self._size])
+        return elastic.results.x[: self._problem.size], False
 
-    def _terms(self, problem: ForceProblem) -> dict[str, Array]:
+    def _terms(self, k: int) -> dict[str, Array]:
         """ProxQP's matrices."""
-        lever = np.pad(problem.lever, ((0, 0), (0, self._size - self._forces)))
-        hessian = lever.T @ lever
-        hessian[range(self._forces), range(self._forces)] += FORCE_WEIGHT
-        sides = len(self._cone)
         return {
-            "H": hessian,
-            "g": -lever.T @ problem.b_joints,
-            "A": problem.wrench,
-            "b": problem.b_base,
-            "C": np.vstack([self._cone, lever]),
-            "l": np.concatenate([np.full(sides, -np.inf), problem.b_joints - self._tau_max]),
-            "u": np.concatenate([np.zeros(sides), problem.b_joints + self._tau_max]),
+            "H": self._hessian[k],
+            "g": self._gradient[k],
+            "A": self._problem.wrench[k],
+            "b": self._problem.b_base[k],
+            "C": self._rows[k],
+            "l": self._lower[k],
+            "u": self._upper[k],
         }
 
 
@@ -120,13 +135,13 @@ def _with_slack(terms: dict[str, Array]) -> dict[str, Array]:
 
 
 def _new_qp(terms: dict[str, Array]) -> proxqp.dense.QP:
-    qp = proxqp.dense.QP(len(terms["g"]), len(terms["b"]), len(terms["u"]))
+    qp = proxqp.dense.QP(len(terms["g"]), NB, len(terms["u"]))
     qp.settings.eps_abs = _ACCURACY
     qp.settings.eps_rel = 0.0
     qp.settings.eps_primal_inf = _INFEASIBLE
     qp.settings.max_iter = _ITERATIONS
     qp.settings.initial_guess = proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
-    qp.init(**terms)
+    qp.init(**terms, compute_preconditioner=False)
     return qp
 
 

@@ -14,6 +14,7 @@ paper          FR, FL, RR, RL      (joints only)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -66,6 +67,8 @@ def to_mujoco(
     v: Array | None = None,
     a: Array | None = None,
     tau: Array | None = None,
+    *,
+    joints: Sequence[str] | None = None,
 ) -> MujocoState:
     """Convert a state of the floating-base robot from Pinocchio to MuJoCo; batched.
 
@@ -75,12 +78,14 @@ def to_mujoco(
         v: Velocity, shape (..., 18); needed where `a` is given.
         a: Acceleration, shape (..., 18).
         tau: Motor torques [N m], shape (..., 12).
+        joints: Names of the joints in the order of MuJoCo's model; that of the URDF if None. Of
+            a compiled model: `[m.joint(i).name for i in range(1, m.njnt)]`.
 
     Raises:
-        InvalidInput: A shape does not fit, or `a` comes without `v`.
+        InvalidInput: A shape does not fit, `a` comes without `v`, or `joints` are not the robot's.
     """
     q, v, a, tau = _checked(robot, q, v, a, tau)
-    order = joint_order(robot.joint_names, robot.urdf_joint_names)
+    order = joint_order(robot.joint_names, tuple(joints or robot.urdf_joint_names))
     rotation = rotation_matrix(q[..., 3:7])
     qpos = np.concatenate([q[..., :3], q[..., [6, 3, 4, 5]], q[..., 7:][..., order]], axis=-1)
     qvel = qacc = None
@@ -100,13 +105,15 @@ def from_mujoco(
     qvel: Array | None = None,
     qacc: Array | None = None,
     ctrl: Array | None = None,
+    *,
+    joints: Sequence[str] | None = None,
 ) -> PinocchioState:
     """Convert a state of the floating-base robot from MuJoCo to Pinocchio; batched.
 
     The inverse of `to_mujoco`; arguments and errors are those of its result.
     """
     qpos, qvel, qacc, ctrl = _checked(robot, qpos, qvel, qacc, ctrl)
-    order = joint_order(robot.urdf_joint_names, robot.joint_names)
+    order = joint_order(tuple(joints or robot.urdf_joint_names), robot.joint_names)
     q = np.concatenate([qpos[..., :3], qpos[..., [4, 5, 6, 3]], qpos[..., 7:][..., order]], axis=-1)
     inverse = np.swapaxes(rotation_matrix(q[..., 3:7]), -1, -2)
     v = a = None
@@ -120,13 +127,24 @@ def from_mujoco(
 
 
 def to_paper(robot: Robot, joints: Array) -> Array:
-    """Joint quantities (..., 12) in the paper's order of legs."""
-    return np.asarray(joints)[..., joint_order(robot.joint_names, _paper_names(robot))]
+    """Joint quantities (..., 12) in the paper's order of legs.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a robot that has not two front and two rear legs.
+    """
+    return as_array("joints", joints, robot.nu, None)[
+        ..., joint_order(robot.joint_names, _paper_names(robot))
+    ]
 
 
 def from_paper(robot: Robot, joints: Array) -> Array:
-    """Joint quantities (..., 12) from the paper's order of legs to Pinocchio's."""
-    return np.asarray(joints)[..., joint_order(_paper_names(robot), robot.joint_names)]
+    """Joint quantities (..., 12) from the paper's order of legs to Pinocchio's.
+
+    Errors are those of `to_paper`.
+    """
+    return as_array("joints", joints, robot.nu, None)[
+        ..., joint_order(_paper_names(robot), robot.joint_names)
+    ]
 
 
 def rotation_matrix(quaternion: Array) -> Array:

@@ -13,15 +13,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
-from ._contacts import Contact, contact_radius, jacobian_at
-from ._force_qp import FORCE_WEIGHT, ForceProblem, ForceQP, cone_sides
+from ._contacts import Contact, contact_radius
+from ._force_problem import ForceProblem, SaddlePoint, force_problem, saddle_point
+from ._force_qp import cone_sides, constrained_forces
 from ._state import as_array, as_state, known_name, leg_indices
 from ._typing import Array, BoolArray
-from .conventions import rotation_matrix
 from .errors import InvalidInput
-from .robot import NB, Robot
+from .robot import Robot
 
 if TYPE_CHECKING:
     from .gait import Gait
@@ -34,8 +33,6 @@ SAGITTAL_GUIDE = ("y", "roll", "pitch", "yaw")
 
 _TOLERANCE = 1e-6
 """Violation up to which a solution counts as feasible [N, N m]."""
-_RANK = 1e-9
-"""Relative size below which a singular value counts as zero."""
 
 
 class InverseDynamics(NamedTuple):
@@ -121,26 +118,20 @@ def inverse_dynamics(
         UnknownName: There is no such leg, contact or guide coordinate.
     """
     q, v = as_state(robot, q, v)
-    a = as_array("a", a, robot.nv, q.shape[:-1])
+    batch = q.shape[:-1]
+    a = as_array("a", a, robot.nv, batch)
     legs, axes = leg_indices(robot, feet), _guide_axes(guide)
-    motion = (q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), a.reshape(-1, robot.nv))
-    problem = _problem(robot, motion, legs, contact_radius(robot, contact), axes)
-    forces = _minimum_torque(problem)
-    inside = np.ones(len(forces), dtype=bool)
+    motion = (q, v, a)
+    if batch or friction is not None:
+        motion = (q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), a.reshape(-1, robot.nv))
+    problem = force_problem(robot, motion, legs, contact_radius(robot, contact), axes)
+    conditions = saddle_point(problem)
+    forces = conditions.solve()
+    inside: BoolArray | np.bool_ = np.True_
     if friction is not None:
         tau_max = _torque_limits(robot, torque_limits)
-        inside = _constrain(problem, forces, _positive("friction", friction), tau_max)
-
-    batch, split = q.shape[:-1], 3 * len(legs)
-    lam, held = forces[:, :split], forces[:, split:]
-    residual = np.abs(_apply(problem.wrench, forces) - problem.b_base).max(axis=-1)
-    return InverseDynamics(
-        tau=(problem.b_joints - _apply(problem.lever, lam)).reshape(*batch, robot.nu),
-        lam=lam.reshape(*batch, split),
-        guide=held.reshape(*batch, len(axes)),
-        residual=residual.reshape(batch),
-        feasible=(inside & (residual <= _TOLERANCE)).reshape(batch),
-    )
+        inside = _constrain(problem, conditions, forces, _positive("friction", friction), tau_max)
+    return _solution(problem, forces, inside, batch)
 
 
 def feedforward(
@@ -221,72 +212,40 @@ def _torque_limits(robot: Robot, limits: npt.ArrayLike | None) -> Array:
     return np.broadcast_to(array, (robot.nu,))
 
 
-def _problem(
-    robot: Robot,
-    motion: tuple[Array, Array, Array],
-    legs: Sequence[int],
-    radius: float,
-    axes: Sequence[int],
-) -> ForceProblem:
-    """The equations of motion at n instants of a motion (q, v, a), stacked."""
-    q, v, a = motion
-    needed = np.empty_like(v)  # (n, 18)
-    jacobian = np.empty((len(q), 3 * len(legs), robot.nv))
-    for row in range(len(q)):
-        needed[row] = pin.rnea(robot.model, robot.data, q[row], v[row], a[row])
-        jacobian[row] = jacobian_at(robot, q[row], legs, radius)
-    transposed = np.swapaxes(jacobian, -1, -2)  # (n, 18, 3 feet)
-    # World forces at the trunk's origin, in the trunk's axes as the base's equations are.
-    guide = np.zeros((len(q), NB, NB))
-    guide[:, :3, :3] = guide[:, 3:, 3:] = np.swapaxes(rotation_matrix(q[:, 3:7]), -1, -2)
-    return ForceProblem(
-        lever=transposed[:, NB:],
-        b_joints=needed[:, NB:],
-        wrench=np.concatenate([transposed[:, :NB], guide[:, :, list(axes)]], axis=-1),
-        b_base=needed[:, :NB],
-    )
-
-
-def _minimum_torque(problem: ForceProblem) -> Array:
-    """Forces y of n problems, shape (n, 3 feet + guides), without cones and limits.
-
-    First the smallest forces that meet the base's equations, or violate them least; then, among
-    forces that change nothing there, those that reduce the torques most.
-    """
-    n, _, size = problem.wrench.shape
-    _, motors, columns = problem.lever.shape
-    if size == 0:
-        return np.zeros((n, 0))
-    inverse = np.asarray(np.linalg.pinv(problem.wrench, rcond=_RANK))  # (n, size, 6)
-    forces = _apply(inverse, problem.b_base)
-    free = np.eye(size) - inverse @ problem.wrench  # (n, size, size)
-    cost = np.zeros((n, motors + columns, size))
-    cost[:, :motors, :columns] = problem.lever
-    cost[:, motors:, :columns] = np.sqrt(FORCE_WEIGHT) * np.eye(columns)
-    target = np.pad(problem.b_joints, ((0, 0), (0, columns)))
-    step = np.asarray(np.linalg.pinv(cost @ free, rcond=_RANK))  # (n, size, 12 + 3 feet)
-    return forces + _apply(step, target - _apply(cost, forces))
-
-
-def _constrain(problem: ForceProblem, forces: Array, friction: float, tau_max: Array) -> BoolArray:
-    """Bring the forces of n problems, in place, within cones and limits; which ones are, (n,)."""
-    size, columns = forces.shape[-1], problem.lever.shape[-1]
-    sides = cone_sides(friction, columns // 3)
+def _constrain(
+    problem: ForceProblem,
+    conditions: SaddlePoint,
+    forces: Array,
+    friction: float,
+    tau_max: Array,
+) -> BoolArray:
+    """Bring forces y (n, size) in place within cones and limits; which ones are, shape (n,)."""
+    contacts = problem.contacts
+    sides = cone_sides(friction, contacts // 3).T  # (3 feet, 8 feet)
 
     def inside() -> BoolArray:
-        lam = forces[:, :columns]
-        tau = problem.b_joints - _apply(problem.lever, lam)
-        in_cone = (lam @ sides.T <= _TOLERANCE).all(axis=-1)
-        return np.asarray(in_cone & (np.abs(tau) <= tau_max + _TOLERANCE).all(axis=-1))
+        in_cone = (forces[:, :contacts] @ sides <= _TOLERANCE).all(axis=-1)
+        within = (np.abs(problem.torques(forces)) <= tau_max + _TOLERANCE).all(axis=-1)
+        return np.asarray(in_cone & within)
 
-    outside = np.flatnonzero(~inside())
-    if columns and outside.size:
-        qp = ForceQP(columns // 3, size - columns, friction, tau_max)
-        for row in outside:
-            forces[row] = qp.solve(ForceProblem(*(part[row] for part in problem)))
+    first = inside()
+    outside = np.flatnonzero(~first)
+    if not contacts or not outside.size:
+        return first
+    forces[outside] = constrained_forces(problem, conditions, outside, friction, tau_max)
     return inside()
 
 
-def _apply(matrices: Array, vectors: Array) -> Array:
-    """Matrices (n, i, j) times vectors (n, j)."""
-    return np.asarray(np.einsum("nij,nj->ni", matrices, vectors))
+def _solution(
+    problem: ForceProblem, forces: Array, inside: BoolArray | np.bool_, batch: tuple[int, ...]
+) -> InverseDynamics:
+    """Torques, forces and verdicts, in the shape of the batch."""
+    contacts = problem.contacts
+    residual = np.abs(problem.rest(forces)).max(axis=-1)
+    return InverseDynamics(
+        tau=problem.torques(forces).reshape(*batch, problem.b_joints.shape[-1]),
+        lam=forces[..., :contacts].reshape(*batch, contacts),
+        guide=forces[..., contacts:].reshape(*batch, problem.size - contacts),
+        residual=residual.reshape(batch),
+        feasible=np.asarray(inside & (residual <= _TOLERANCE)).reshape(batch),
+    )

@@ -1,4 +1,4 @@
-"""Kinematics of the legs: feet from joints, joints from feet, trunk velocity from stance legs."""
+"""Kinematics: feet from joints, joints from feet, trunk velocity from stance legs, whole body."""
 
 from __future__ import annotations
 
@@ -12,9 +12,22 @@ import pinocchio as pin
 from ._legs import LegGeometry, leg_geometry, leg_motion, turn_y
 from ._state import as_array, as_q, as_state, known_name, leg_indices
 from ._typing import Array, BoolArray
+from ._whole_body import WholeBodySolution, inverse_kinematics
 from .conventions import rotation_matrix
 from .errors import InvalidInput
-from .robot import JOINTS, NB, NL, Robot
+from .robot import JOINTS, NB, Robot
+
+__all__ = [
+    "LegSolution",
+    "WholeBodySolution",
+    "foot_positions",
+    "foot_velocities",
+    "inverse_kinematics",
+    "leg_angle",
+    "leg_inverse_kinematics",
+    "leg_odometry",
+    "rotate_leg",
+]
 
 Knee = Literal["backward", "forward"]
 """Which way a knee points; backward is a negative calf angle, as on the A1."""
@@ -186,10 +199,11 @@ def leg_odometry(
     return np.asarray(np.einsum("...ij,...j->...i", rotation, mean))
 
 
-def leg_angle(joints: npt.ArrayLike) -> Array:
+def leg_angle(robot: Robot, joints: npt.ArrayLike) -> Array:
     """Leg angles: theta = q_thigh + q_calf / 2, below eq. (11) of the paper; batched.
 
     Args:
+        robot: The robot, with legs of three joints.
         joints: Joint angles [rad], shape (..., 12).
 
     Returns:
@@ -198,7 +212,7 @@ def leg_angle(joints: npt.ArrayLike) -> Array:
     Raises:
         InvalidInput: A wrong shape or NaN.
     """
-    legs = as_array("joints", joints, NL, None)
+    legs = as_array("joints", joints, robot.nu, None)
     return legs[..., 1 :: len(JOINTS)] + 0.5 * legs[..., 2 :: len(JOINTS)]
 
 

@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import linprog, minimize
 
 from pronk_pin import Robot, dynamics
-from pronk_pin._force_qp import FORCE_WEIGHT, cone_sides
+from pronk_pin._force_problem import FORCE_WEIGHT
+from pronk_pin._force_qp import cone_sides
 from pronk_pin._typing import Array
 from pronk_pin.conventions import rotation_matrix
 from pronk_pin.errors import InvalidInput, UnknownName

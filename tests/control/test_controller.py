@@ -107,7 +107,7 @@ def test_speed_regulation_turns_the_legs_by_touchdown_and_nothing_else(
     begin, end = np.swapaxes(planned, 0, 1)
 
     np.testing.assert_allclose(tape.position[:, 0], begin, atol=1e-12)
-    turned = leg_angle(tape.position[:, -1]) - leg_angle(end)
+    turned = leg_angle(robot, tape.position[:, -1]) - leg_angle(robot, end)
     assert np.all((turned < -0.005) & (turned >= -0.15))
     np.testing.assert_allclose(tape.position[:, -1, 0::3], end[:, 0::3], atol=1e-12)
     np.testing.assert_allclose(tape.position[:, -1, 2::3], end[:, 2::3], atol=1e-12)
