@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -18,6 +19,9 @@ from ._typing import Array
 from .errors import IntegrationFailed, InvalidInput
 from .kinematics import foot_positions
 from .robot import NB, Robot
+
+_EVALUATIONS = 300_000
+"""Evaluations of the dynamics after which the motion counts as hopeless; a stride takes 1,000."""
 
 Torque = Callable[[float], Array]
 """Motor torques [N m], shape (12,), at a time since the start [s]."""
@@ -122,11 +126,18 @@ def integrate(
     """Integrate from a state (q, v) by an adaptive Runge-Kutta method of order 8, sampled at times.
 
     Raises:
-        IntegrationFailed: The step became too small.
+        IntegrationFailed: The steps became too small or too many.
     """
-    robot = problem.robot
+    robot, evaluations = problem.robot, itertools.count(1)
+
+    def rate(t: float, y: Array) -> Array:
+        if next(evaluations) > _EVALUATIONS:
+            reason = f"{_EVALUATIONS} evaluations of the dynamics spent"
+            raise IntegrationFailed(t, float(times[-1]), reason)
+        return problem.rate(t, y)
+
     result = solve_ivp(
-        problem.rate,
+        rate,
         (0.0, float(times[-1])),
         np.concatenate([q, v, [0.0]]),
         method="DOP853",

@@ -312,7 +312,7 @@ def simulate_phase(
     contact: Contact = "point",
     baumgarte: tuple[float, float] | None = None,
     samples: int = 101,
-    tolerance: float = 1e-10,
+    tolerance: float = 1e-11,
 ) -> PhaseSimulation:
     """Integrate flight or stance from a state under given torques, and report the drift.
 

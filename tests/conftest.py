@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import mujoco
@@ -12,6 +13,7 @@ import pytest
 
 from pronk_pin import Robot, load_robot
 from pronk_pin._typing import Array
+from pronk_pin.robot import ROBOTS
 
 
 class States(NamedTuple):
@@ -28,32 +30,50 @@ def robot() -> Robot:
     return load_robot("a1")
 
 
+@pytest.fixture(scope="session", params=ROBOTS)
+def any_robot(request: pytest.FixtureRequest) -> Robot:
+    """Each of the robots that are known by name."""
+    return load_robot(request.param)
+
+
+def draw_states(robot: Robot, n: int, *, seed: int = 0) -> States:
+    """n random states of a robot."""
+    rng = np.random.default_rng(seed)
+    quaternion = rng.normal(size=(n, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    joints = rng.uniform(robot.q_min, robot.q_max, size=(n, robot.nu))
+    q = np.concatenate([rng.normal(size=(n, 3)), quaternion, joints], axis=-1)
+    v, a = 2.0 * rng.normal(size=(2, n, robot.nv))
+    return States(q, v, a, 5.0 * rng.normal(size=(n, robot.nu)))
+
+
+def draw_crouches(robot: Robot, n: int, *, seed: int = 0) -> States:
+    """n states near standing, where contacts are well conditioned and forces moderate."""
+    rng = np.random.default_rng(seed)
+    q = np.tile(robot.standing, (n, 1))
+    q[:, 7:] += 0.1 * rng.normal(size=(n, robot.nu))
+    v, a = rng.normal(size=(2, n, robot.nv))
+    return States(q, 0.5 * v, a, 3.0 * rng.normal(size=(n, robot.nu)))
+
+
 @pytest.fixture(scope="session")
 def random_states(robot: Robot) -> Callable[..., States]:
-    def draw(n: int, *, seed: int = 0) -> States:
-        rng = np.random.default_rng(seed)
-        quaternion = rng.normal(size=(n, 4))
-        quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
-        joints = rng.uniform(robot.q_min, robot.q_max, size=(n, robot.nu))
-        q = np.concatenate([rng.normal(size=(n, 3)), quaternion, joints], axis=-1)
-        v, a = 2.0 * rng.normal(size=(2, n, robot.nv))
-        return States(q, v, a, 5.0 * rng.normal(size=(n, robot.nu)))
-
-    return draw
+    return partial(draw_states, robot)
 
 
 @pytest.fixture(scope="session")
 def crouches(robot: Robot) -> Callable[..., States]:
-    """States near standing, where contacts are well conditioned and forces moderate."""
+    return partial(draw_crouches, robot)
 
-    def draw(n: int, *, seed: int = 0) -> States:
-        rng = np.random.default_rng(seed)
-        q = np.tile(robot.standing, (n, 1))
-        q[:, 7:] += 0.1 * rng.normal(size=(n, robot.nu))
-        v, a = rng.normal(size=(2, n, robot.nv))
-        return States(q, 0.5 * v, a, 3.0 * rng.normal(size=(n, robot.nu)))
 
-    return draw
+@pytest.fixture(scope="session")
+def any_states(any_robot: Robot) -> Callable[..., States]:
+    return partial(draw_states, any_robot)
+
+
+@pytest.fixture(scope="session")
+def any_crouches(any_robot: Robot) -> Callable[..., States]:
+    return partial(draw_crouches, any_robot)
 
 
 @pytest.fixture(scope="session")

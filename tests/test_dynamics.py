@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin import Robot, dynamics
+from pronk_pin import Robot, dynamics, load_robot
+from pronk_pin._derivatives import _implicit
 from pronk_pin._typing import Array
 from pronk_pin.conventions import to_mujoco
-from pronk_pin.errors import InvalidInput, UnknownName
+from pronk_pin.energetics import centroidal_momentum, kinetic_energy, potential_energy
+from pronk_pin.errors import IntegrationFailed, InvalidInput, UnknownName
+from pronk_pin.inverse_dynamics import inverse_dynamics
 from pronk_pin.kinematics import foot_positions, foot_velocities, leg_inverse_kinematics
 
 Draw = Callable[..., tuple[Array, Array, Array, Array]]
@@ -129,19 +133,21 @@ def test_flight_satisfies_the_equations_of_motion(robot: Robot, random_states: D
 
 
 @pytest.mark.parametrize("contact", CONTACTS)
-@pytest.mark.parametrize("feet", STANCES)
 def test_stance_solves_the_equations_of_the_paper(
-    robot: Robot, random_states: Draw, contact: str, feet: tuple[str, ...] | None
+    any_robot: Robot, any_states: Draw, contact: str
 ) -> None:
-    for q, v, _, tau in zip(*random_states(25), strict=True):
+    robot, (q, v, _, tau) = any_robot, any_states(1000)
+    for feet in (None, *((robot.legs[1], robot.legs[2]), (robot.legs[3],))):
         solution = dynamics.stance_dynamics(robot, q, v, tau, feet=feet, contact=contact)
-        matrix, rhs = dynamics.stance_dae(robot, q, v, tau, feet=feet, contact=contact)
-        dense = np.linalg.solve(matrix, rhs)
-        assert relative(np.concatenate([solution.a, solution.lam]), dense) < 1e-9
-        jacobian = dynamics.contact_jacobian(robot, q, feet=feet, contact=contact)
-        bias = dynamics.contact_bias(robot, q, v, feet=feet, contact=contact)
-        assert np.abs(jacobian @ solution.a + bias).max() < 1e-9
-        assert not solution.singular
+        assert not solution.singular.any()
+        for row in range(0, len(q), 1 if feet is None else 20):
+            state = (robot, q[row], v[row])
+            matrix, rhs = dynamics.stance_dae(*state, tau[row], feet=feet, contact=contact)
+            a, lam = solution.a[row], solution.lam[row]
+            dense = np.linalg.solve(matrix, rhs)
+            assert relative(np.concatenate([a, lam]), dense) < 1e-9
+            achieved = matrix[robot.nv :, : robot.nv] @ a - rhs[robot.nv :]
+            assert np.abs(achieved).max() < 1e-9 * max(1.0, np.abs(a).max())
 
 
 def test_stance_without_feet_is_flight(robot: Robot, random_states: Draw) -> None:
@@ -238,6 +244,199 @@ def test_an_impact_never_creates_energy(
         bounced = foot_velocities(robot, q, after.v)
         expected = -restitution * foot_velocities(robot, q, v)
         np.testing.assert_allclose(bounced, expected, atol=1e-10)
+
+
+def central_differences(
+    robot: Robot, function: Callable[..., tuple[Array, ...]], state: tuple[Array, Array, Array]
+) -> list[Array]:
+    """Derivatives of each result by q, v and tau: (first by q, first by v, ..., last by tau)."""
+    q, v, tau = state
+    step = 1e-6
+    moves = {
+        robot.nv: lambda d: (pin.integrate(robot.model, q, d), v, tau),
+        -robot.nv: lambda d: (q, v + d, tau),
+        robot.nu: lambda d: (q, v, tau + d),
+    }
+    blocks = []
+    for size, move in moves.items():
+        ends = [
+            [function(*move(sign * step * axis)) for axis in np.eye(abs(size))] for sign in (1, -1)
+        ]
+        pairs = [zip(*end, strict=True) for end in ends]
+        blocks.append(
+            [
+                (np.array(up) - np.array(down)).T / (2 * step)
+                for up, down in zip(*pairs, strict=True)
+            ]
+        )
+    return [block[k] for k in range(len(blocks[0])) for block in blocks]
+
+
+def test_flight_derivatives_agree_with_differences(any_robot: Robot, any_states: Draw) -> None:
+    for q, v, _, tau in zip(*any_states(5), strict=True):
+        exact = dynamics.flight_derivatives(any_robot, q, v, tau)
+        numeric = central_differences(
+            any_robot, lambda *x: (dynamics.flight_dynamics(any_robot, *x),), (q, v, tau)
+        )
+        for name, mine, other in zip(exact._fields, exact, numeric, strict=True):
+            assert relative(mine, other) < 1e-5, name
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_stance_derivatives_agree_with_differences(
+    any_robot: Robot, any_states: Draw, contact: str
+) -> None:
+    for row, (q, v, _, tau) in enumerate(zip(*any_states(6), strict=True)):
+        feet = (None, any_robot.legs[1:], any_robot.legs[2:3])[row % 3]
+        how = {"feet": feet, "contact": contact}
+        exact = dynamics.stance_derivatives(any_robot, q, v, tau, **how)
+        numeric = central_differences(
+            any_robot,
+            lambda *x, how=how: dynamics.stance_dynamics(any_robot, *x, **how)[:2],
+            (q, v, tau),
+        )
+        assert not exact.singular
+        for name, mine, other in zip(exact._fields[:-1], exact[:-1], numeric, strict=True):
+            assert relative(mine, other) < 1e-5, name
+
+
+def test_rolling_derivatives_become_those_of_points_for_small_feet(
+    robot: Robot, random_states: Draw
+) -> None:
+    """Two ways to the same matrices: Pinocchio's for points, ours for spheres of no size."""
+    points = load_robot(replace(robot.spec, foot_radius=0.0))
+    q, v, _, tau = (x[0] for x in random_states(1))
+    pinocchio, ours = (
+        dynamics.stance_derivatives(robot, q, v, tau),
+        _implicit(points, (q, v, tau), (0, 1, 2, 3), 0.0),
+    )
+    for mine, other in zip(ours[:-1], pinocchio[:-1], strict=True):
+        assert relative(mine, other) < 1e-10
+
+
+def test_derivatives_of_a_singular_stance_are_finite_and_say_so(robot: Robot) -> None:
+    q, zero = stretched(robot), np.zeros(18)
+    derivatives = dynamics.stance_derivatives(robot, q, zero, np.zeros(12))
+    assert derivatives.singular
+    assert all(np.isfinite(block).all() for block in derivatives)
+
+
+def test_a_flight_keeps_its_energy_and_falls_as_a_stone(any_robot: Robot, any_states: Draw) -> None:
+    q, v, _, _ = (x[0] for x in any_states(1))
+    flight = dynamics.simulate_phase(any_robot, q, v, np.zeros(12), duration=0.5, feet=())
+    assert flight.energy_drift < 1e-8
+    energy = kinetic_energy(any_robot, flight.q, flight.v) + potential_energy(any_robot, flight.q)
+    assert np.abs(energy - energy[0]).max() < 1e-8
+    momentum = centroidal_momentum(any_robot, flight.q, flight.v)
+    spin = np.abs(momentum.angular - momentum.angular[0]).max()
+    assert spin < 1e-8 * max(1.0, np.abs(momentum.angular[0]).max())
+    lost = momentum.linear[0] - momentum.linear
+    expected = any_robot.mass * any_robot.gravity * flight.t
+    np.testing.assert_allclose(lost[:, 2], expected, atol=1e-8)
+    assert flight.lam.shape == (101, 0)
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("baumgarte", [None, (400.0, 40.0)])
+def test_a_simulated_stance_stays_on_its_feet(
+    robot: Robot, crouches: Draw, contact: str, baumgarte: tuple[float, float] | None
+) -> None:
+    v = crouches(1).v[0]
+    q = robot.standing
+    v = dynamics.impact(robot, q, v, contact=contact).v
+    hold = inverse_dynamics(robot, q, np.zeros(18), np.zeros(18), contact=contact).tau
+    stance = dynamics.simulate_phase(
+        robot, q, v, hold, duration=0.1, contact=contact, baumgarte=baumgarte
+    )
+    assert stance.foot_drift < 1e-9
+    assert stance.contact_speed < 1e-8
+    assert stance.energy_drift < 1e-8
+    assert not stance.singular
+    # It did move, as the acceleration says: the integral of the velocity is the way.
+    assert np.abs(stance.q[-1] - q).max() > 1e-3
+    middle = np.diff(stance.v, axis=0) / np.diff(stance.t)[:, None]
+    np.testing.assert_allclose(middle, 0.5 * (stance.a[1:] + stance.a[:-1]), atol=0.05)
+
+
+def test_baumgarte_wins_back_what_has_drifted(robot: Robot) -> None:
+    q = robot.standing.copy()
+    q[2] += 1e-3  # the feet are a millimetre too high
+    hold = inverse_dynamics(robot, q, np.zeros(18), np.zeros(18)).tau
+    drifted = dynamics.simulate_phase(robot, q, np.zeros(18), hold, duration=0.2)
+    returned = dynamics.simulate_phase(
+        robot, q, np.zeros(18), hold, duration=0.2, baumgarte=(2500.0, 100.0)
+    )
+    heights = [
+        foot_positions(robot, x.q[-1])[:, 2] - robot.foot_radius for x in (drifted, returned)
+    ]
+    assert np.abs(heights[0] - 1e-3).max() < 1e-6
+    assert np.abs(heights[1]).max() < 1e-5
+
+
+def test_torques_may_be_constant_sampled_or_a_function(robot: Robot, crouches: Draw) -> None:
+    q, v, _, tau = (x[0] for x in crouches(1))
+    ways = (tau, np.tile(tau, (5, 1)), lambda t: tau)
+    ends = [dynamics.simulate_phase(robot, q, v, way, duration=0.05, feet=()).q[-1] for way in ways]
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-12)
+    np.testing.assert_allclose(ends[2], ends[0], atol=1e-12)
+    rising = np.array([0.0 * tau, tau])
+    ramp = dynamics.simulate_phase(robot, q, v, rising, duration=0.05, feet=(), samples=3)
+    np.testing.assert_allclose(ramp.tau, [0.0 * tau, 0.5 * tau, tau], atol=1e-14)
+
+
+def test_a_simulation_that_cannot_be_is_refused(robot: Robot) -> None:
+    q, v, tau = robot.standing, np.zeros(18), np.zeros(12)
+    for wrong in ({"duration": 0.0}, {"duration": 1.0, "samples": 1}):
+        with pytest.raises(InvalidInput, match="give a positive duration"):
+            dynamics.simulate_phase(robot, q, v, tau, **wrong)
+    with pytest.raises(InvalidInput, match=r"tau\(t\) holds NaN"):
+        dynamics.simulate_phase(robot, q, v, lambda t: tau * np.nan, duration=0.1)
+    with pytest.raises(InvalidInput, match=r"tau has shape \(1, 12\)"):
+        dynamics.simulate_phase(robot, q, v, tau[None], duration=0.1)
+
+
+def test_a_hopeless_simulation_ends_with_a_word(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pronk_pin._simulate._EVALUATIONS", 500)
+    huge = np.full(12, 1e9)
+    with pytest.raises(IntegrationFailed, match=r"stopped at .* shorten the duration"):
+        dynamics.simulate_phase(robot, robot.standing, np.zeros(18), huge, duration=1.0, feet=())
+
+
+@pytest.mark.parametrize("part", ["q", "v", "tau"])
+def test_nan_is_found_wherever_it_hides(robot: Robot, crouches: Draw, part: str) -> None:
+    """The quick look at single states must not miss what the full check would find."""
+    q, v, _, tau = (x[0] for x in crouches(1))
+    clean = {"q": q, "v": v, "tau": tau}
+    functions: dict[str, tuple[Callable[..., object], ...]] = {
+        "q": (dynamics.mass_matrix, dynamics.gravity, dynamics.contact_jacobian),
+        "qv": (
+            dynamics.coriolis_matrix,
+            dynamics.nonlinear_effects,
+            dynamics.contact_bias,
+            dynamics.impact,
+            lambda *x: dynamics.impact(*x, feet=("RR",)),
+        ),
+        "qvtau": (
+            dynamics.flight_dynamics,
+            dynamics.stance_dynamics,
+            lambda *x: dynamics.stance_dynamics(*x, feet=("RR",)),
+            lambda *x: dynamics.stance_dynamics(*x, contact="rolling"),
+            dynamics.stance_derivatives,
+            dynamics.flight_derivatives,
+        ),
+    }
+    for names, group in functions.items():
+        if part not in names:
+            continue
+        for value in (np.nan, np.inf):
+            for index in range(len(clean[part])):
+                broken = {name: x.copy() for name, x in clean.items() if name in names}
+                broken[part][index] = value
+                for function in group:
+                    with pytest.raises(InvalidInput, match=r"NaN|norm"):
+                        function(robot, *broken.values())
 
 
 def test_wrong_arguments_are_refused_with_a_remedy(robot: Robot) -> None:
