@@ -22,10 +22,10 @@ _WORLD = "pronk_pin_world"
 def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     """The robot as MuJoCo reads its URDF: a floating base, the fixed links fused.
 
-    Compiled once, so that geometries and inertias are those of the fused bodies; change it and
-    compile it again. The base is the URDF's root link, as in Pinocchio, and bears the name
-    `robot.spec.base_link`. Each body's frame is Pinocchio's joint frame. There are no actuators;
-    the URDF's effort limits stand in the joints' `actfrcrange`.
+    Compiled once, so that geometries are those of the fused bodies and every inertia stands in
+    `inertia` and `iquat`; change it and compile it again. The base is the URDF's root link, as in
+    Pinocchio, and bears the name `robot.spec.base_link`. Each body's frame is Pinocchio's joint
+    frame. There are no actuators; the URDF's effort limits stand in the joints' `actfrcrange`.
 
     Args:
         robot: The robot.
@@ -40,13 +40,19 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     base = _float_base(root)
     try:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-        spec.compile()
+        model = spec.compile()
     except ValueError as error:
         raise FileProblem(
             robot.urdf_path,
             f"MuJoCo refuses this URDF ({' '.join(str(error).split())})",
             "correct the link or joint it names",
         ) from error
+    for body in spec.bodies[1:]:  # 0 is the world
+        # In one form for every body, so that whoever adds a load finds what is there: links that
+        # were fused with others have it already, the rest as the URDF's full matrix.
+        compiled = model.body(body.name)
+        body.inertia, body.iquat = compiled.inertia, compiled.iquat
+        body.fullinertia = np.full(6, np.nan)
     # The trunk may hang from a root link by a fixed joint; fused, it goes by the root's name.
     spec.body(base).name = robot.spec.base_link
     return spec
