@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from ._actuators import actuator_kind, joint_actuators, through_gears, torque_limits
 from ._mechanism import FLOATING, TRUNK, Dynamics, Foot, Joint, Link, Mechanism, Point, State
 from ._typing import Array
 from .conventions import rotation_matrix
@@ -14,7 +15,6 @@ from .robot import NB
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}
-_AT_A_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
 
 def read_mujoco(model: mujoco.MjModel, label: str, *, round_off: float = 0.0) -> Mechanism:
@@ -153,9 +153,11 @@ class _Reader:
         body, dof = int(model.jnt_bodyid[joint]), model.jnt_dofadr[joint]
         first = model.body_jntadr[body] == joint
         parent = self.link_of(model.body_parentid[body]) if first else self.names[joint - 1]
-        drives = [index for index in _actuators(model) if model.actuator_trnid[index, 0] == joint]
+        drives = [
+            index for index in joint_actuators(model) if model.actuator_trnid[index, 0] == joint
+        ]
         gears = [float(model.actuator_gear[index, 0]) for index in drives]
-        actuator, gain = _kind(model, drives)
+        actuator, gain = actuator_kind(model, drives)
         unlimited = np.array([-np.inf, np.inf])
         return Joint(
             kind=_KINDS[model.jnt_type[joint]],
@@ -164,12 +166,12 @@ class _Reader:
             axis=self._axes.T @ self.data.xaxis[joint],
             zero=float(model.qpos0[model.jnt_qposadr[joint]]),
             limits=model.jnt_range[joint].copy() if model.jnt_limited[joint] else unlimited,
-            torque_limits=_torque_limits(model, joint, drives, gain),
+            torque_limits=torque_limits(model, joint, drives, gain),
             speed_limit=None,
             armature=float(model.dof_armature[dof])
-            + _through_gears(model, "actuator_armature", drives, gears),
+            + through_gears(model, "actuator_armature", drives, gears),
             damping=float(model.dof_damping[dof])
-            + _through_gears(model, "actuator_damping", drives, gears),
+            + through_gears(model, "actuator_damping", drives, gears),
             friction=float(model.dof_frictionloss[dof]),
             stiffness=float(model.jnt_stiffness[joint]),
             actuator=actuator,
@@ -214,67 +216,10 @@ def _extras(model: mujoco.MjModel, reader: _Reader) -> dict[str, int]:
     return {
         "closed loops and other equality constraints": int(model.neq),
         "tendons": int(model.ntendon),
-        "actuators that act on no joint": len(model.actuator_trntype) - len(_actuators(model)),
+        "actuators that act on no joint": len(model.actuator_trntype) - len(joint_actuators(model)),
         "joints with nonlinear damping or springs": nonlinear,
         "bodies with gravity compensation": int(np.count_nonzero(model.body_gravcomp[bodies])),
     }
-
-
-def _actuators(model: mujoco.MjModel) -> list[int]:
-    """Actuators that act on joints."""
-    return [i for i, kind in enumerate(model.actuator_trntype) if kind in _AT_A_JOINT]
-
-
-def _through_gears(
-    model: mujoco.MjModel, name: str, drives: list[int], gears: list[float]
-) -> float:
-    """A property of the actuators as it is felt at their joint; MuJoCo 3 has none such."""
-    values = getattr(model, name, np.zeros(len(model.actuator_trntype)))
-    return float(sum(gear**2 * values[index] for index, gear in zip(drives, gears, strict=True)))
-
-
-def _kind(model: mujoco.MjModel, drives: list[int]) -> tuple[str | None, float | None]:
-    """The kind of a joint's actuator, and the torque per unit of control of a motor."""
-    if not drives:
-        return ("none", None) if len(model.actuator_trntype) else (None, None)
-    if len(drives) > 1:
-        return f"{len(drives)} actuators", None
-    index = drives[0]
-    gain, bias = model.actuator_gainprm[index], model.actuator_biasprm[index][:3]
-    affine = model.actuator_biastype[index] == mujoco.mjtBias.mjBIAS_AFFINE
-    if not affine:
-        bias = np.zeros(3)
-    plain = (
-        model.actuator_gaintype[index] == mujoco.mjtGain.mjGAIN_FIXED
-        and model.actuator_dyntype[index] == mujoco.mjtDyn.mjDYN_NONE
-        and (affine or model.actuator_biastype[index] == mujoco.mjtBias.mjBIAS_NONE)
-    )
-    if not plain or bias[0] != 0.0:
-        return "general", None
-    if not bias.any():
-        return "motor", float(gain[0] * model.actuator_gear[index, 0])
-    if bias[1] == -gain[0]:
-        return f"position servo, kp {gain[0]:g}, kv {0.0 - bias[2]:g}", None
-    if bias[1] == 0.0 and bias[2] == -gain[0]:
-        return f"velocity servo, kv {gain[0]:g}", None
-    return "general", None
-
-
-def _torque_limits(
-    model: mujoco.MjModel, joint: int, drives: list[int], gain: float | None
-) -> Array:
-    """What the joint's actuator can give at most, by whichever limit is the tightest."""
-    ranges = [np.array([-np.inf, np.inf])]
-    if model.jnt_actfrclimited[joint]:
-        ranges.append(model.jnt_actfrcrange[joint])
-    if len(drives) == 1:
-        index = drives[0]
-        if model.actuator_forcelimited[index]:
-            ranges.append(model.actuator_forcerange[index] * model.actuator_gear[index, 0])
-        if gain is not None and model.actuator_ctrllimited[index]:
-            ranges.append(model.actuator_ctrlrange[index] * gain)
-    both = np.sort(np.array(ranges), axis=1)  # a negative gear turns a range over
-    return np.array([both[:, 0].max(), both[:, 1].min()])
 
 
 class _MuJoCo:
