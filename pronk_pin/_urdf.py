@@ -36,12 +36,12 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     """
     root = ElementTree.parse(robot.urdf_path).getroot()
     _drop_shapes(root, collisions=collisions)
-    _merge_impossible_inertias(root)
     base = _float_base(root)
     try:
+        _merge_impossible_inertias(root)
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
         model = spec.compile()
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:  # the latter from Pinocchio's inertias
         raise FileProblem(
             robot.urdf_path,
             f"MuJoCo refuses this URDF ({' '.join(str(error).split())})",

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin import Robot, load_robot
+from pronk_pin import Robot, RobotSpec, load_robot
 from pronk_pin._urdf import mujoco_spec
 from pronk_pin.errors import FileProblem, InvalidInput
 from pronk_pin.parity import ROUND_OFF, SIX_DIGITS, Parity, compare_models
@@ -345,6 +345,46 @@ def test_what_else_acts_on_a_robot_is_counted(robot: Robot) -> None:
         ("bodies with gravity compensation", "model"),
         ("closed loops and other equality constraints", "model"),
     }
+
+
+@pytest.mark.parametrize(
+    ("actuators", "kind"),
+    [
+        ("<motor joint='j'/>", "motor"),
+        ("<position joint='j' kp='50' kv='2'/>", "position servo, kp 50, kv 2"),
+        ("<position joint='j' kp='50'/>", "position servo, kp 50, kv 0"),
+        ("<velocity joint='j' kv='3'/>", "velocity servo, kv 3"),
+        ("<intvelocity joint='j' kp='50' actrange='-1 1'/>", "general"),
+        ("<general joint='j' gainprm='2' biastype='affine' biasprm='1 0 0'/>", "general"),
+        ("<general joint='j' gainprm='2' biastype='affine' biasprm='0 -1 0'/>", "general"),
+        ("<motor joint='j'/><damper joint='j' kv='1' ctrlrange='0 1'/>", "2 actuators"),
+        ("<adhesion body='b' ctrlrange='0 1'/>", "none"),
+    ],
+)
+def test_kinds_of_actuators_are_told_apart(robot: Robot, actuators: str, kind: str) -> None:
+    text = f"""<mujoco><worldbody><body><freejoint/><geom size="1"/><body name="b">
+        <joint name="j" actuatorfrcrange="-9 9"/><geom size="1"/></body></body></worldbody>
+        <actuator>{actuators}</actuator></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    rows = {row.what: row for row in compare_models(model, model, states=1).rows}
+    assert rows["actuator"].a == kind
+    assert rows["torque limits"].a == (-9.0, 9.0)
+    assert rows["actuators that act on no joint"].a == (1.0 if kind == "none" else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("moment", "message"),
+    [("0.1", r"MuJoCo refuses this URDF .*FR_hip"), ("-1", "inertia should be positive")],
+)
+def test_an_inertia_that_no_body_can_have_is_named(
+    robot: Robot, tmp_path: Path, moment: str, message: str
+) -> None:
+    """Where no fixed joint ties the link to another; the base of the Go1 is tied to the trunk."""
+    path = tmp_path / "impossible.urdf"
+    path.write_text(robot.urdf_path.read_text().replace('"0.000469246"', f'"{moment}"', 1))
+    own = load_robot(RobotSpec("impossible", str(path)))
+    with pytest.raises(FileProblem, match=message):
+        mujoco_spec(own)
 
 
 def test_urdfs_are_compared_without_knowing_their_feet(robot: Robot, tmp_path: Path) -> None:
