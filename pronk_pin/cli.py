@@ -1,18 +1,20 @@
-"""The command line: `pronk-pin compare | gaits | view | report`."""
+"""The command line: `pronk-pin compare | gaits | view | report | parity`."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Protocol
 
+import numpy as np
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
+from ._urdf import mujoco_spec
 from .compare import Experiment, Results, default_folder, run_experiment
 from .compare.tables import format_tables
-from .errors import PronkError
+from .errors import InvalidInput, PronkError
 from .gait import (
     SPEEDS,
     GaitLibrary,
@@ -21,6 +23,7 @@ from .gait import (
     describe_library,
     load_library,
 )
+from .parity import compare_models
 from .robot import load_robot
 from .viz import Scene, gait_scene, serve, write_replay
 from .viz.practice import practice_scene
@@ -168,32 +171,78 @@ class Gaits:
         self.action.run()
 
 
+@dataclass(frozen=True)
+class Parity:
+    """Tell whether an MJCF or a URDF is the same robot as ours; exit with 1 where it is not.
+
+    Prints what differs of masses, joints and motors, and the largest differences of M, h and J on
+    random states. Without a model, our robot in Pinocchio is compared with MuJoCo's reading of
+    the same URDF.
+    """
+
+    model: Positional[Path | None] = None
+    """MJCF or URDF to compare with."""
+    robot: str = "a1"
+    """Robot it should be."""
+    states: int = 200
+    """Number of random states."""
+    seed: int = 0
+    """Seed of the random states."""
+    tolerance: float | None = None
+    """Relative difference up to which values agree; by default 1e-9, or 1e-5 for an MJCF whose
+    numbers have six digits, as MuJoCo writes them."""
+    full: bool = False
+    """Print every row of the table, not only those that differ."""
+
+    def run(self) -> int:
+        """Do it; the exit code is 0 where the two are the same."""
+        if self.seed < 0:
+            raise InvalidInput(f"seed={self.seed}; give a number from 0 on")
+        robot = load_robot(self.robot)
+        parity = compare_models(
+            robot,
+            mujoco_spec(robot).compile() if self.model is None else self.model,
+            states=self.states,
+            rng=np.random.default_rng(self.seed),
+            tolerance=self.tolerance,
+        )
+        print(parity.table(full=self.full))
+        return 0 if parity.agrees else 1
+
+
+class _Runs(Protocol):
+    """A command: does it, and says with which code to exit if not with 0."""
+
+    def run(self) -> int | None: ...
+
+
 Command = (
     Annotated[Compare, subcommand("compare")]
     | Annotated[Gaits, subcommand("gaits")]
     | Annotated[View, subcommand("view")]
     | Annotated[Report, subcommand("report")]
+    | Annotated[Parity, subcommand("parity")]
 )
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Entry point; the exit code is 0, 1 for an error of ours, 2 for wrong usage, 130 on Ctrl-C."""
+    """Entry point; the exit code is 0, 1 for an error of ours or models that differ, 2 for wrong
+    usage, 130 on Ctrl-C."""
     try:
-        command = tyro.cli(
+        command: _Runs = tyro.cli(
             Command,
             prog="pronk-pin",
             description="When a legged robot repeats a motion, does practice beat the model?",
             args=arguments,
             config=(OmitSubcommandPrefixes,),
         )
-        command.run()
+        return command.run() or 0
     except PronkError as error:
         print(f"pronk-pin: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("pronk-pin: interrupted", file=sys.stderr)
         return 130
-    return 0
 
 
 def _write_pages(results: Results) -> None:

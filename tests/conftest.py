@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -13,6 +12,7 @@ import pytest
 
 from pronk_pin import Robot, load_robot
 from pronk_pin._typing import Array
+from pronk_pin._urdf import mujoco_spec
 from pronk_pin.robot import ROBOTS
 
 
@@ -79,13 +79,9 @@ def any_crouches(any_robot: Robot) -> Callable[..., States]:
 @pytest.fixture(scope="session")
 def mujoco_model(robot: Robot) -> mujoco.MjModel:
     """The same URDF in MuJoCo, its trunk floating and without the meshes MuJoCo cannot read."""
-    root = ElementTree.parse(robot.urdf_path).getroot()
-    for link in root.iter("link"):
-        for shape in (*link.findall("visual"), *link.findall("collision")):
-            link.remove(shape)
-    for joint in root.iter("joint"):
-        child = joint.find("child")
-        if child is not None and child.get("link") == robot.spec.base_link:
-            joint.set("type", "floating")
-    text = ElementTree.tostring(root, encoding="unicode")
-    return mujoco.MjSpec.from_string(text).compile()
+    return mujoco_spec(robot, collisions=False).compile()
+
+
+@pytest.fixture(scope="session")
+def any_mujoco_model(any_robot: Robot) -> mujoco.MjModel:
+    return mujoco_spec(any_robot, collisions=False).compile()

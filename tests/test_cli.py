@@ -8,7 +8,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from pronk_pin import load_robot
+from pronk_pin._urdf import mujoco_spec
 from pronk_pin.cli import main
+from pronk_pin.robot import ROBOTS
 
 SHORT = ["--speeds", "0.0", "0.4", "--schedule.practice", "2", "--schedule.learning", "3"]
 
@@ -119,6 +122,39 @@ def test_gaits_build_makes_a_library_that_show_reads(
     assert "18-DoF residual" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_parity_finds_the_same_robot_in_both_engines(
+    robot: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["parity", "--robot", robot, "--states", "20"]) == 0
+    output = capsys.readouterr().out
+    assert output.endswith("The same robot, to round-off.\n")
+    errors = re.findall(r"^  (?:mass|bias|foot).* (\S+e[+-]\d+)$", output, flags=re.MULTILINE)
+    assert len(errors) == 3
+    assert max(map(float, errors)) < 1e-12
+
+
+def test_parity_exits_with_1_where_a_model_differs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "robot.xml"
+    text = mujoco_spec(load_robot("a1")).to_xml()
+    path.write_text(text)
+    assert main(["parity", str(path)]) == 0
+    path.write_text(text.replace('mass="1.013"', 'mass="1.1"', 1))
+    capsys.readouterr()
+    assert main(["parity", str(path)]) == 1
+    output = capsys.readouterr().out
+    assert re.search(r"^mass +FR_thigh_joint +1\.013 +1\.1 +0\.087 +kg$", output, re.MULTILINE)
+    assert "1 of " in output
+    assert "torque limits" not in output
+    assert main(["parity", str(path), "--full"]) == 1
+    assert "torque limits" in capsys.readouterr().out
+    assert main(["parity", str(path), "--tolerance", "0.2"]) == 0
+    assert main(["parity", str(path), "--robot", "go1"]) == 1
+    assert main(["parity", str(load_robot("a1").urdf_path)]) == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -136,6 +172,11 @@ def test_gaits_build_makes_a_library_that_show_reads(
         (["view", "--robot", "spot"], "unknown robot 'spot'"),
         (["gaits", "show", "0.9"], "outside the gait library"),
         (["gaits", "build", "--robot", "spot"], "unknown robot 'spot'"),
+        (["parity", "nowhere.xml"], "nowhere.xml: cannot be read (No such file or directory)"),
+        (["parity", "--robot", "spot"], "unknown robot 'spot'; choose one of: a1"),
+        (["parity", "--states", "0"], "states=0; at least one is needed"),
+        (["parity", "--seed", "-1"], "seed=-1; give a number from 0 on"),
+        (["parity", "--tolerance", "-1"], "tolerance=-1.0; give a number from 0 on"),
     ],
 )
 def test_bad_input_gets_one_line_with_the_remedy(

@@ -38,26 +38,29 @@ def mujoco_velocity_map(robot: Robot, q: Array) -> Array:
 
 
 def test_mass_bias_and_jacobian_agree_with_mujoco(
-    robot: Robot, random_states: Draw, mujoco_model: mujoco.MjModel
+    any_robot: Robot, any_states: Draw, any_mujoco_model: mujoco.MjModel
 ) -> None:
-    data = mujoco.MjData(mujoco_model)
-    mass = np.zeros((robot.nv, robot.nv))
-    for q, v, _, _ in zip(*random_states(40), strict=True):
-        # MuJoCo's accelerations where Pinocchio's are zero: the frames turn with the base.
-        converted = to_mujoco(robot, q, v, np.zeros(robot.nv))
-        data.qpos[:], data.qvel[:] = converted.qpos, converted.qvel
-        mujoco.mj_forward(mujoco_model, data)
-        mujoco.mj_fullM(mujoco_model, data, mass)
-        change = mujoco_velocity_map(robot, q)
-        bias = change.T @ (mass @ converted.qacc + data.qfrc_bias)
-        assert relative(dynamics.mass_matrix(robot, q), change.T @ mass @ change) < 1e-12
-        assert relative(dynamics.nonlinear_effects(robot, q, v), bias) < 1e-12
-        jacobian = np.zeros((3, robot.nv))
-        for row, (leg, place) in enumerate(zip(robot.legs, foot_positions(robot, q), strict=True)):
-            calf = mujoco_model.body(f"{leg}_calf").id
-            mujoco.mj_jac(mujoco_model, data, jacobian, None, place, calf)
-            ours = dynamics.contact_jacobian(robot, q)[3 * row : 3 * row + 3]
-            assert relative(ours, jacobian @ change) < 1e-12
+    robot, model = any_robot, any_mujoco_model
+    q, v, _, _ = any_states(1000)
+    # MuJoCo's accelerations where Pinocchio's are zero: the frames turn with the base.
+    states = to_mujoco(robot, q, v, np.zeros_like(v))
+    order = [model.joint(i).name for i in range(1, model.njnt)]
+    assert order == list(robot.urdf_joint_names)
+    knees = [model.joint(robot.spec.leg_joints(leg)[-1]) for leg in robot.legs]
+    data, mass = mujoco.MjData(model), np.zeros((robot.nv, robot.nv))
+    jacobian = np.zeros((3, robot.nv))
+    for row, (q_row, v_row) in enumerate(zip(q, v, strict=True)):
+        data.qpos[:], data.qvel[:] = states.qpos[row], states.qvel[row]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, mass)
+        change = mujoco_velocity_map(robot, q_row)
+        bias = change.T @ (mass @ states.qacc[row] + data.qfrc_bias)
+        assert relative(dynamics.mass_matrix(robot, q_row), change.T @ mass @ change) < 1e-12
+        assert relative(dynamics.nonlinear_effects(robot, q_row, v_row), bias) < 1e-12
+        ours = dynamics.contact_jacobian(robot, q_row).reshape(-1, 3, robot.nv)
+        for place, knee, mine in zip(foot_positions(robot, q_row), knees, ours, strict=True):
+            mujoco.mj_jac(model, data, jacobian, None, place, knee.bodyid[0])
+            assert relative(mine, jacobian @ change) < 1e-12
 
 
 def test_bias_forces_are_coriolis_and_gravity(robot: Robot, random_states: Draw) -> None:

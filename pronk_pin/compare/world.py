@@ -7,7 +7,6 @@ Pinocchio's order.
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -17,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from .._typing import Array, BoolArray, IntArray
+from .._urdf import mujoco_spec
 from ..robot import Robot
 from .scenario import Scenario
 
@@ -32,8 +32,7 @@ def build_model(robot: Robot, scenario: Scenario, *, free: bool = False) -> mujo
         scenario: What the world adds to the URDF.
         free: Leave the trunk its six degrees of freedom instead of x and z only.
     """
-    spec = mujoco.MjSpec.from_string(_urdf_without_meshes(robot))
-    spec.compile()  # fuses the fixed links, so that what follows finds the feet in the calves
+    spec = mujoco_spec(robot)
     spec.option.timestep = scenario.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
@@ -52,21 +51,9 @@ def build_model(robot: Robot, scenario: Scenario, *, free: bool = False) -> mujo
             trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     _add_payload(trunk, scenario)
     _add_motors(spec, robot, scenario)
+    _name_feet(spec, robot)
     _add_ground(spec, robot, scenario)
     return spec.compile()
-
-
-def _urdf_without_meshes(robot: Robot) -> str:
-    """The URDF with a floating trunk and without visuals, whose meshes MuJoCo cannot read."""
-    root = ElementTree.parse(robot.urdf_path).getroot()
-    for link in root.iter("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    for joint in root.iter("joint"):
-        child = joint.find("child")
-        if child is not None and child.get("link") == robot.spec.base_link:
-            joint.set("type", "floating")  # fixed, it would fuse the trunk to the world
-    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _add_payload(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
@@ -104,6 +91,18 @@ def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
         motor.biasprm = [0] * 10
 
 
+def _name_feet(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """The sphere that each foot stands on; one of our own where the URDF has a mesh instead."""
+    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
+    for leg, foot, foot_id in zip(robot.legs, robot.foot_names, robot.foot_ids, strict=True):
+        calf = spec.joint(robot.spec.leg_joints(leg)[-1]).parent
+        centre = np.array(robot.model.frames[foot_id].placement.translation)
+        geom = next((geom for geom in calf.geoms if geom.type == sphere), None)
+        if geom is None:
+            geom = calf.add_geom(type=sphere, pos=centre, size=[robot.foot_radius, 0, 0])
+        geom.name = foot
+
+
 def _add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
     """The floor, and sensors of the force between it and each foot."""
     contact = {
@@ -119,10 +118,7 @@ def _add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
         if geom.name != _FLOOR:
             geom.contype, geom.conaffinity = 0, 1  # the robot meets the floor, not itself
             geom.solref, geom.friction, geom.condim = contact.values()
-    for leg, foot in zip(robot.legs, robot.foot_names, strict=True):
-        calf = spec.joint(robot.spec.leg_joints(leg)[-1]).parent
-        sphere = next(g for g in calf.geoms if g.type == mujoco.mjtGeom.mjGEOM_SPHERE)
-        sphere.name = foot
+    for foot in robot.foot_names:
         force = mujoco.mjtConDataField.mjCONDATA_FORCE
         spec.add_sensor(
             name=foot,

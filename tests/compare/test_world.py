@@ -17,7 +17,8 @@ from pronk_pin.control import Gains, load_controller
 from pronk_pin.conventions import to_mujoco
 from pronk_pin.dynamics import mass_matrix, nonlinear_effects
 from pronk_pin.kinematics import foot_positions
-from pronk_pin.robot import Robot
+from pronk_pin.parity import compare_models
+from pronk_pin.robot import ROBOTS, Robot, load_robot
 
 IDEAL = load_scenario("ideal")
 LOADED = replace(IDEAL, name="loaded", payload=3.0, payload_position=(0.1, -0.03, 0.08))
@@ -104,6 +105,22 @@ def test_the_feet_are_where_pinocchio_has_them(robot: Robot) -> None:
 
     feet = [data.geom(name).xpos for name in robot.foot_names]
     np.testing.assert_allclose(feet, foot_positions(robot, q), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_robot_has_a_world_with_its_dynamics_and_its_feet(name: str) -> None:
+    """Feet of meshes become spheres of the robot's foot radius, and weigh nothing."""
+    robot = load_robot(name)
+    model = build_model(robot, LOADED, free=True)
+    parity = compare_models(replace(robot, model=loaded_model(robot, LOADED)), model, states=20)
+    assert parity.mass_matrix is not None
+    assert parity.bias is not None
+    assert max(parity.mass_matrix, parity.bias) < 1e-12
+    data = data_at(robot, model, robot.standing)
+    feet = [data.geom(foot).xpos for foot in robot.foot_names]
+    np.testing.assert_allclose(feet, foot_positions(robot, robot.standing), atol=1e-9)
+    radii = [model.geom(foot).size[0] for foot in robot.foot_names]
+    np.testing.assert_allclose(radii, robot.foot_radius)
 
 
 @pytest.mark.parametrize("torque_constant", [1.0, 0.85])

@@ -1,0 +1,297 @@
+"""Are two models the same robot? Masses, joints and motors side by side, and M, h and J.
+
+A model is a `Robot`, a URDF, an MJCF, or a compiled MuJoCo model. Links and joints are matched by
+the joints' names, so that the order of the joints does not matter, and compared relative to the
+joints' anchors in the trunk's axes, so that it does not matter where a model puts its bodies'
+frames. The trunk's own frame does matter: it is what the base coordinates of a state place.
+"""
+
+from __future__ import annotations
+
+import operator
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from ._mechanism import FLOATING, Mechanism, Point, State, read_pinocchio
+from ._mechanism_mujoco import read_mujoco
+from ._parity_table import Row, compare_tables, format_table, format_value
+from ._typing import Array
+from .errors import FileProblem, InvalidInput
+from .robot import Robot
+
+__all__ = ["ROUND_OFF", "SIX_DIGITS", "Model", "Parity", "Row", "compare_models"]
+
+Model: TypeAlias = Robot | str | Path | mujoco.MjModel
+"""What can be compared."""
+
+ROUND_OFF = 1e-9
+"""Relative tolerance for models with all their digits."""
+
+SIX_DIGITS = 1e-5
+"""Relative tolerance for an MJCF of six significant digits, as MuJoCo writes it."""
+
+
+@dataclass(frozen=True)
+class Parity:
+    """Whether two models are the same robot, and where they differ.
+
+    Attributes:
+        a, b: What was compared.
+        rows: The table.
+        states: Number of random states.
+        tolerance: Relative difference up to which values agree.
+        mass_matrix: Largest |dM_ij| / sqrt(M_ii M_jj) over the states, M of the floating robot
+            with its rotors, in Pinocchio's layout; None where it cannot be compared.
+        bias: Largest |dh_i| / max |h_i| of the forces h = H v + G, without damping and friction;
+            None likewise.
+        jacobian: Largest |dJ_ij| / max |J_ij| of the feet, the same material points in both
+            models, in the world's axes; None likewise.
+        reason: Why they cannot be compared, and what to do; empty where they are.
+    """
+
+    a: str
+    b: str
+    rows: tuple[Row, ...]
+    states: int
+    tolerance: float
+    mass_matrix: float | None
+    bias: float | None
+    jacobian: float | None
+    reason: str
+
+    @property
+    def differences(self) -> tuple[Row, ...]:
+        """The rows that differ."""
+        return tuple(row for row in self.rows if row.agrees is False)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether everything agrees within the tolerance."""
+        dynamics = (self.mass_matrix, self.bias, self.jacobian)
+        same = all(value is not None and value <= self.tolerance for value in dynamics)
+        return same and not self.differences
+
+    def table(self, *, full: bool = False) -> str:
+        """The comparison as text.
+
+        Args:
+            full: Every row, not only those that differ.
+        """
+        judged = sum(row.agrees is not None for row in self.rows)
+        lines = [f"a  {self.a}", f"b  {self.b}", ""]
+        shown = self.rows if full else self.differences
+        if shown:
+            lines += [*format_table(shown, verdict=full), ""]
+        lines.append(
+            f"{len(self.differences)} of {judged} table values differ by more than "
+            f"{self.tolerance:g} (relative)"
+        )
+        for row in self.rows:
+            if row.what == "joint order" and row.a != row.b:
+                lines.append("joint orders, which names convert")
+                lines += [f"  a  {format_value(row.a)}", f"  b  {format_value(row.b)}"]
+        if self.reason:
+            lines.append(f"M, h and J are not compared: {self.reason}")
+        else:
+            lines.append(f"largest relative difference on {self.states} random states")
+            for name, value in (
+                ("mass matrix M", self.mass_matrix),
+                ("bias forces h", self.bias),
+                ("foot Jacobians J", self.jacobian),
+            ):
+                assert value is not None
+                lines.append(f"  {name:16s}  {value:.1e}{self._mark(value)}")
+        verdict = "The same robot, to round-off." if self.agrees else "Not the same robot."
+        return "\n".join([*lines, "", verdict])
+
+    def _mark(self, value: float) -> str:
+        return "" if value <= self.tolerance else "  differs"
+
+
+def compare_models(
+    a: Model,
+    b: Model,
+    *,
+    states: int = 200,
+    rng: np.random.Generator | None = None,
+    tolerance: float | None = None,
+) -> Parity:
+    """Compare two models of a legged robot.
+
+    Where a model knows nothing of a quantity (the velocity limits of an MJCF, the feet of a URDF
+    without a `RobotSpec`, the actuators of an MJCF that has none), its row holds None and is not
+    judged. The order of the joints is reported but not judged either: names convert it.
+
+    Args:
+        a: A `Robot`, the path of a URDF or an MJCF, or a compiled MuJoCo model.
+        b: The other one.
+        states: Number of random states: any attitude, joints within a's limits.
+        rng: Draws the states; by default a generator with seed 0.
+        tolerance: Relative difference up to which values agree. By default `ROUND_OFF`, or
+            `SIX_DIGITS` where a file is an MJCF whose numbers have no more than six digits.
+
+    Raises:
+        FileProblem: A file is missing, or neither a URDF nor an MJCF.
+        InvalidInput: A model is not of a robot with hinges and slides, or an option is out of
+            range.
+    """
+    try:
+        states = operator.index(states)
+    except TypeError as error:
+        raise InvalidInput(f"states={states!r}; give a whole number") from error
+    if states < 1:
+        raise InvalidInput(f"states={states}; at least one is needed")
+    first, second = _read(a), _read(b)
+    if tolerance is None:
+        tolerance = max(ROUND_OFF, first.round_off, second.round_off)
+    if not 0.0 <= tolerance < np.inf:
+        raise InvalidInput(f"tolerance={tolerance}; give a number from 0 on, such as 1e-9")
+    reason = _obstacle(first, second)
+    mass = bias = jacobian = None
+    if not reason:
+        rng = np.random.default_rng(0) if rng is None else rng
+        mass, bias, jacobian = _compare_dynamics(first, second, states, rng)
+    return Parity(
+        a=first.label,
+        b=second.label,
+        rows=tuple(compare_tables(first, second, tolerance)),
+        states=states,
+        tolerance=float(tolerance),
+        mass_matrix=mass,
+        bias=bias,
+        jacobian=jacobian,
+        reason=reason,
+    )
+
+
+def _obstacle(a: Mechanism, b: Mechanism) -> str:
+    """Why M, h and J of two mechanisms cannot be compared; empty if they can."""
+    for one, other in ((a, b), (b, a)):
+        missing = [name for name in other.joints if name not in one.joints]
+        if missing:
+            return f"{one.label} has no {', '.join(missing)}; give both the same joints"
+    for one in (a, b):
+        if one.base != FLOATING:
+            return (
+                f"the trunk of {one.label} is {one.base}; let it float, with <freejoint/> in the "
+                "trunk's body"
+            )
+    return ""
+
+
+def _compare_dynamics(
+    a: Mechanism, b: Mechanism, count: int, rng: np.random.Generator
+) -> tuple[float, float, float]:
+    """Largest relative differences of M, h and J."""
+    names, points = tuple(a.joints), _points(a, b)
+    limits = np.array([a.joints[name].limits for name in names])
+    low, high = np.clip(limits, -np.pi, np.pi).T
+    mass = jacobian = 0.0
+    forces, changes = [], []
+    for _ in range(count):
+        quaternion = rng.normal(size=4)
+        state = State(
+            position=rng.normal(size=3),
+            quaternion=quaternion / np.linalg.norm(quaternion),
+            base_velocity=2.0 * rng.normal(size=6),
+            angles=rng.uniform(low, np.maximum(low, high)),
+            rates=2.0 * rng.normal(size=len(names)),
+        )
+        one, other = (model.engine.evaluate(names, points, state) for model in (a, b))
+        scale = np.sqrt(np.diag(one.mass_matrix))
+        change = np.abs(other.mass_matrix - one.mass_matrix) / np.outer(scale, scale)
+        mass = max(mass, float(change.max()))
+        change = np.abs(other.jacobian - one.jacobian)
+        jacobian = max(jacobian, float(change.max() / np.abs(one.jacobian).max()))
+        forces.append(np.abs(one.bias))
+        changes.append(np.abs(other.bias - one.bias))
+    bias = np.max(changes, axis=0) / np.max(forces, axis=0)
+    return mass, float(bias.max()), jacobian
+
+
+def _points(a: Mechanism, b: Mechanism) -> list[Point]:
+    """The feet; where neither model names them, the centres of mass of the last links."""
+    for model in (a, b):
+        if model.named_feet:
+            return [Point(link, foot.centre) for link, feet in model.feet.items() for foot in feet]
+    bearing = {joint.parent for joint in a.joints.values()}
+    return [Point(name, a.links[name].centre) for name in a.joints if name not in bearing]
+
+
+def _read(model: Model) -> Mechanism:
+    if isinstance(model, Robot):
+        label = f"{model.name} (Pinocchio, {model.urdf_path.name})"
+        return read_pinocchio(model.model, label, model)
+    if isinstance(model, mujoco.MjModel):
+        return read_mujoco(model, f"{_model_name(model)} (MuJoCo)")
+    if isinstance(model, str | Path):
+        return _read_file(Path(model).expanduser())
+    raise InvalidInput(
+        f"{type(model).__name__} is no model; give a Robot, the path of a URDF or an MJCF, or a "
+        "mujoco.MjModel"
+    )
+
+
+def _model_name(model: mujoco.MjModel) -> str:
+    """MuJoCo keeps the model's name at the start of its names."""
+    return bytes(model.names).split(b"\0", 1)[0].decode(errors="replace") or "a model"
+
+
+def _read_file(path: Path) -> Mechanism:
+    """A URDF by Pinocchio, an MJCF by MuJoCo; which it is, its first element tells."""
+    try:
+        root = ElementTree.parse(path).getroot().tag
+    except OSError as error:
+        raise FileProblem(
+            path, f"cannot be read ({error.strerror})", "give the path of a URDF or an MJCF"
+        ) from error
+    except (ElementTree.ParseError, ValueError) as error:
+        raise FileProblem(
+            path, f"not XML ({error})", "give the path of a URDF or an MJCF"
+        ) from error
+    if root == "robot":
+        try:
+            model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
+        except (ValueError, RuntimeError) as error:
+            raise FileProblem(path, f"not a usable URDF ({error})", "check the file") from error
+        return read_pinocchio(model, f"{path} (Pinocchio)")
+    if root != "mujoco":
+        raise FileProblem(
+            path,
+            f"neither a URDF nor an MJCF (it begins with <{root}>)",
+            "give a file that begins with <robot> or <mujoco>",
+        )
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        six_digits = _has_six_digits(spec)
+        compiled = spec.compile()
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        missing = "rror opening file" in reason or "not found" in reason
+        raise FileProblem(
+            path,
+            f"MuJoCo cannot load it ({reason})",
+            "put the meshes and files it names beside it, where its meshdir says"
+            if missing
+            else "correct what it names",
+        ) from error
+    return read_mujoco(compiled, f"{path} (MuJoCo)", round_off=SIX_DIGITS if six_digits else 0.0)
+
+
+def _has_six_digits(spec: mujoco.MjSpec) -> bool:
+    """Whether the numbers of an MJCF would look the same with six significant digits."""
+    numbers: list[Array] = []
+    for body in spec.bodies:
+        numbers += [body.pos, body.quat, body.ipos, body.iquat, body.inertia, body.fullinertia]
+        numbers.append(np.array([body.mass]))
+    for joint in spec.joints:
+        numbers += [joint.pos, joint.axis, joint.range]
+    values = np.concatenate([np.ravel(part) for part in numbers])
+    values = values[np.isfinite(values)]
+    return all(float(f"{value:.6g}") == value for value in values)
