@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from pronk_pin import Robot, load_robot
+from pronk_pin import Robot, RobotSpec, load_robot
 from pronk_pin._typing import Array
 from pronk_pin._urdf import mujoco_spec
 from pronk_pin.robot import ROBOTS
@@ -34,6 +34,24 @@ def robot() -> Robot:
 def any_robot(request: pytest.FixtureRequest) -> Robot:
     """Each of the robots that are known by name."""
     return load_robot(request.param)
+
+
+@pytest.fixture(scope="session")
+def biped() -> Robot:
+    """A robot of one's own making: two legs, other names, feet without collision spheres."""
+    return load_robot(
+        RobotSpec(
+            "bolt",
+            "bolt_description/robots/bolt.urdf",
+            base_link="base_link",
+            legs=("FL", "FR"),
+            joints=("HAA", "HFE", "KFE"),
+            joint_pattern="{leg}_{joint}",
+            foot_pattern="{leg}_FOOT",
+            standing=(0.0, 0.8, -1.6),
+            foot_radius=0.01,
+        )
+    )
 
 
 def draw_states(robot: Robot, n: int, *, seed: int = 0) -> States:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 
 import mujoco
@@ -25,9 +26,9 @@ from pronk_pin.kinematics import foot_positions, foot_velocities
 Draw = Callable[..., tuple[Array, Array, Array, Array]]
 
 
-def test_a_round_trip_gives_the_state_back(robot: Robot, random_states: Draw) -> None:
-    state = random_states(200)
-    back = from_mujoco(robot, *to_mujoco(robot, *state))
+def test_a_round_trip_gives_the_state_back(any_robot: Robot, any_states: Draw) -> None:
+    state = any_states(200)
+    back = from_mujoco(any_robot, *to_mujoco(any_robot, *state))
     for name, before, after in zip(back._fields, state, back, strict=True):
         assert after is not None
         scale = np.abs(before).max()
@@ -74,29 +75,50 @@ def test_mujoco_sees_the_same_feet(
 
 
 def test_mujoco_falls_with_the_same_acceleration(
-    robot: Robot, random_states: Draw, mujoco_model: mujoco.MjModel
+    any_robot: Robot, any_states: Draw, any_mujoco_model: mujoco.MjModel
 ) -> None:
-    q, v, _, tau = random_states(20)
-    converted = to_mujoco(robot, q, v, tau=tau)
+    q, v, _, tau = any_states(20)
+    converted = to_mujoco(any_robot, q, v, tau=tau)
     assert converted.qvel is not None
     assert converted.ctrl is not None
-    data = mujoco.MjData(mujoco_model)
+    model = copy.copy(any_mujoco_model)
+    model.dof_damping[:] = 0.0  # Go1's URDF has some, which the equations of motion have not
+    data = mujoco.MjData(model)
     qacc = np.zeros_like(v)
     for row in range(len(q)):
         data.qpos[:], data.qvel[:] = converted.qpos[row], converted.qvel[row]
         data.qfrc_applied[6:] = converted.ctrl[row]
-        mujoco.mj_forward(mujoco_model, data)
+        mujoco.mj_forward(model, data)
         qacc[row] = data.qacc_smooth
-    back = from_mujoco(robot, converted.qpos, converted.qvel, qacc)
+    back = from_mujoco(any_robot, converted.qpos, converted.qvel, qacc)
     assert back.a is not None
-    expected = flight_dynamics(robot, q, v, tau)
+    expected = flight_dynamics(any_robot, q, v, tau)
     np.testing.assert_allclose(back.a, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-def test_the_paper_counts_from_the_front_right(robot: Robot) -> None:
+def test_the_paper_counts_from_the_front_right(any_robot: Robot) -> None:
     joints = np.arange(12.0)
-    np.testing.assert_array_equal(to_paper(robot, joints), [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8])
-    np.testing.assert_array_equal(from_paper(robot, to_paper(robot, joints)), joints)
+    np.testing.assert_array_equal(
+        to_paper(any_robot, joints), [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
+    )
+    np.testing.assert_array_equal(from_paper(any_robot, to_paper(any_robot, joints)), joints)
+
+
+def test_another_order_of_joints_is_taken_by_name(robot: Robot, random_states: Draw) -> None:
+    q, v, a, tau = random_states(3)
+    other = robot.joint_names[::-1]
+    there = to_mujoco(robot, q, v, a, tau, joints=other)
+    np.testing.assert_array_equal(there.ctrl, tau[:, ::-1])
+    np.testing.assert_array_equal(there.qpos[:, 7:], q[:, :6:-1])
+    back = from_mujoco(robot, *there, joints=other)
+    np.testing.assert_array_equal(back.tau, tau)
+    with pytest.raises(InvalidInput, match="must name the robot's joints"):
+        to_mujoco(robot, q, joints=other[1:])
+
+
+def test_the_paper_has_no_order_for_a_biped(biped: Robot) -> None:
+    with pytest.raises(InvalidInput, match="two front and two rear legs"):
+        to_paper(biped, np.zeros(6))
 
 
 def test_joints_of_another_robot_are_refused() -> None:

@@ -1,4 +1,4 @@
-"""What the README says works."""
+"""What the README and the pages of documentation say works."""
 
 from __future__ import annotations
 
@@ -12,15 +12,33 @@ from pronk_pin import cli
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
-@pytest.mark.parametrize("code", re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL))
+def examples() -> list[object]:
+    """The Python examples of the README and of the documentation, by their place."""
+    found = []
+    for page in PAGES:
+        for match in re.finditer(r"```python\n(.*?)```", page.read_text(), flags=re.DOTALL):
+            line = page.read_text()[: match.start()].count("\n") + 2
+            found.append(pytest.param(match[1], id=f"{page.name}:{line}"))
+    return found
+
+
+@pytest.mark.parametrize("code", examples())
 def test_examples_run_and_print_what_they_say(
     code: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    exec(compile(code, "README.md", "exec"), {})
-    said = re.findall(r"^print.*# (.*)$", code, flags=re.MULTILINE)
+    exec(compile(code, "example", "exec"), {})
+    said = re.findall(r"^(?:print|\)).*# (.*)$", code, flags=re.MULTILINE)
     assert capsys.readouterr().out.splitlines() == said
+    assert said
+
+
+def test_examples_are_short() -> None:
+    for example in examples():
+        (code,) = example.values  # type: ignore[attr-defined]
+        assert len(code.splitlines()) <= 13, code
 
 
 def test_commands_are_understood(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,9 +50,10 @@ def test_commands_are_understood(monkeypatch: pytest.MonkeyPatch) -> None:
         assert cli.main(shlex.split(command)) == 0, command
 
 
-def test_links_lead_somewhere() -> None:
-    for target in re.findall(r"\]\(([^)#:]+)\)", README):
-        assert (ROOT / target).exists(), target
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
+        assert (page.parent / target).exists(), target
 
 
 def test_the_root_links_lead_into_the_package() -> None:

@@ -10,7 +10,9 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin import Robot, RobotSpec, load_robot
+from pronk_pin.dynamics import stance_dynamics
 from pronk_pin.errors import FileProblem, InvalidInput, UnknownName
+from pronk_pin.inverse_dynamics import inverse_dynamics
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import ROBOTS
 
@@ -110,22 +112,15 @@ def test_every_robot_stands_over_its_feet(name: str) -> None:
     assert (middle[:2] < feet[:, :2].max(axis=0)).all()
 
 
-def test_a_robot_with_other_names_and_joints_is_read_too() -> None:
-    bolt = load_robot(
-        RobotSpec(
-            "bolt",
-            "bolt_description/robots/bolt.urdf",
-            base_link="base_link",
-            legs=("FL", "FR"),
-            joints=("HAA", "HFE", "KFE"),
-            joint_pattern="{leg}_{joint}",
-            foot_pattern="{leg}_FOOT",
-            standing=(0.0, 0.8, -1.6),
-            foot_radius=0.01,
-        )
-    )
-    assert (bolt.nq, bolt.nv, bolt.nu) == (13, 12, 6)
-    assert foot_positions(bolt, bolt.standing).shape == (2, 3)
+def test_a_biped_with_other_names_is_read_too(biped: Robot) -> None:
+    assert (biped.nq, biped.nv, biped.nu) == (13, 12, 6)
+    assert foot_positions(biped, biped.standing).shape == (2, 3)
+    tau = np.zeros(6)
+    stance = stance_dynamics(biped, biped.standing, np.zeros(12), tau)
+    assert (stance.a.shape, stance.lam.shape) == ((12,), (6,))
+    held = inverse_dynamics(biped, biped.standing, np.zeros(12), stance.a)
+    assert held.feasible
+    np.testing.assert_allclose(held.tau, tau, atol=1e-6)
 
 
 @pytest.mark.parametrize(
