@@ -22,7 +22,6 @@ from pronk_pin.kinematics import foot_positions, foot_velocities, leg_inverse_ki
 Draw = Callable[..., tuple[Array, Array, Array, Array]]
 
 CONTACTS = ("point", "rolling")
-STANCES = (None, ("FR", "RL"), ("RR",), ("RL", "FL", "FR"))
 
 
 def relative(value: Array, expected: Array) -> float:
@@ -150,7 +149,7 @@ def test_stance_solves_the_equations_of_the_paper(
             dense = np.linalg.solve(matrix, rhs)
             assert relative(np.concatenate([a, lam]), dense) < 1e-9
             achieved = matrix[robot.nv :, : robot.nv] @ a - rhs[robot.nv :]
-            assert np.abs(achieved).max() < 1e-9 * max(1.0, np.abs(a).max())
+            assert np.abs(achieved).max() < 1e-9
 
 
 def test_stance_without_feet_is_flight(robot: Robot, random_states: Draw) -> None:
@@ -217,19 +216,24 @@ def test_a_singular_stance_says_so_and_stays_finite(
 
 
 @pytest.mark.parametrize("contact", CONTACTS)
-@pytest.mark.parametrize("feet", STANCES)
 def test_a_plastic_impact_stops_the_feet_and_keeps_the_momentum(
-    robot: Robot, random_states: Draw, contact: str, feet: tuple[str, ...] | None
+    any_robot: Robot, any_states: Draw, contact: str
 ) -> None:
-    for q, v, _, _ in zip(*random_states(10), strict=True):
-        after = dynamics.impact(robot, q, v, feet=feet, contact=contact)
-        jacobian = dynamics.contact_jacobian(robot, q, feet=feet, contact=contact)
-        mass = dynamics.mass_matrix(robot, q)
+    robot, (q, v, _, _) = any_robot, any_states(1000)
+    stances = (None, (robot.legs[1], robot.legs[2]), (robot.legs[3],))
+    for row in range(len(q)):
+        how = {"feet": stances[row % 3], "contact": contact}
+        after = dynamics.impact(robot, q[row], v[row], **how)
+        jacobian, mass = (
+            dynamics.contact_jacobian(robot, q[row], **how),
+            dynamics.mass_matrix(robot, q[row]),
+        )
+        change = after.v - v[row]
         assert np.abs(jacobian @ after.v).max() < 1e-10
-        assert np.abs(mass @ (after.v - v) - jacobian.T @ after.impulse).max() < 1e-10
+        assert np.abs(mass @ change - jacobian.T @ after.impulse).max() < 1e-10
+        assert after.v @ mass @ after.v <= v[row] @ mass @ v[row] * (1 + 1e-12)
         # The whole robot's linear momentum changes by the sum of the impulses.
-        before = pin.computeCentroidalMomentum(robot.model, robot.data, q, v).linear.copy()
-        gained = pin.computeCentroidalMomentum(robot.model, robot.data, q, after.v).linear - before
+        gained = centroidal_momentum(robot, q[row], change).linear
         np.testing.assert_allclose(gained, after.impulse.reshape(-1, 3).sum(axis=0), atol=1e-10)
 
 
