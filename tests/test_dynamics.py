@@ -11,9 +11,9 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin import Robot, dynamics, load_robot
-from pronk_pin._derivatives import _implicit
 from pronk_pin._typing import Array
 from pronk_pin.conventions import to_mujoco
+from pronk_pin.dynamics.derivatives import _implicit
 from pronk_pin.energetics import centroidal_momentum, kinetic_energy, potential_energy
 from pronk_pin.errors import IntegrationFailed, InvalidInput, UnknownName
 from pronk_pin.inverse_dynamics import inverse_dynamics
@@ -405,7 +405,7 @@ def test_a_simulation_that_cannot_be_is_refused(robot: Robot) -> None:
 def test_a_hopeless_simulation_ends_with_a_word(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pronk_pin._simulate._EVALUATIONS", 500)
+    monkeypatch.setattr("pronk_pin.dynamics.simulation._EVALUATIONS", 500)
     huge = np.full(12, 1e9)
     with pytest.raises(IntegrationFailed, match=r"stopped at .* shorten the duration"):
         dynamics.simulate_phase(robot, robot.standing, np.zeros(18), huge, duration=1.0, feet=())

@@ -10,8 +10,6 @@ from proxsuite import proxqp
 from scipy.optimize import linprog, minimize
 
 from pronk_pin import Robot, dynamics
-from pronk_pin._force_problem import FORCE_WEIGHT, ForceProblem, force_problem, saddle_point
-from pronk_pin._force_qp import _Chain, cone_sides
 from pronk_pin._typing import Array
 from pronk_pin.conventions import rotation_matrix
 from pronk_pin.errors import InvalidInput, UnknownName
@@ -23,6 +21,13 @@ from pronk_pin.inverse_dynamics import (
     feedforward,
     inverse_dynamics,
 )
+from pronk_pin.inverse_dynamics.problem import (
+    FORCE_WEIGHT,
+    ForceProblem,
+    force_problem,
+    saddle_point,
+)
+from pronk_pin.inverse_dynamics.qp import _Chain, cone_sides
 
 Draw = Callable[..., tuple[Array, Array, Array, Array]]
 

@@ -10,7 +10,6 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin import Robot
-from pronk_pin._legs import leg_geometry, leg_motion
 from pronk_pin._typing import Array
 from pronk_pin.conventions import rotation_matrix
 from pronk_pin.dynamics import contact_jacobian
@@ -24,6 +23,7 @@ from pronk_pin.kinematics import (
     leg_odometry,
     rotate_leg,
 )
+from pronk_pin.kinematics.legs import leg_geometry, leg_motion
 
 Draw = Callable[..., tuple[Array, Array, Array, Array]]
 

@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pinocchio as pin
 from proxsuite import proxqp
 
-from ._contacts import jacobian_at
-from ._state import as_array, as_one, as_q, leg_indices
-from ._typing import Array
-from .errors import InvalidInput
-from .robot import NB, Robot
+from .._state import as_array, as_one, as_q, leg_indices
+from .._typing import Array
+from ..errors import InvalidInput
+from ..robot import NB, Robot
+from .contacts import jacobian_at
 
 _DAMPING = (1e-12, 1e-8, 1e-5, 1e-3, 1e-1, 10.0)
 """Dampings of a step that are tried in turn until one brings the targets nearer."""

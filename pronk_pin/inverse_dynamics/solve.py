@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ._contacts import Contact, contact_radius
-from ._force_problem import ForceProblem, SaddlePoint, force_problem, saddle_point
-from ._force_qp import cone_sides, constrained_forces
-from ._state import as_array, as_state, known_name, leg_indices
-from ._typing import Array, BoolArray
-from .errors import InvalidInput
-from .robot import Robot
+from .._state import as_array, as_state, known_name, leg_indices
+from .._typing import Array, BoolArray
+from ..errors import InvalidInput
+from ..kinematics.contacts import Contact, contact_radius
+from ..robot import Robot
+from .problem import ForceProblem, SaddlePoint, force_problem, saddle_point
+from .qp import cone_sides, constrained_forces
 
 if TYPE_CHECKING:
-    from .gait import Gait
+    from ..gait import Gait
 
 GUIDE_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 """Base coordinates that a guide can hold."""

@@ -6,16 +6,18 @@ columns: the base's are a translation and a rotation in its own frame.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
-from ._contacts import jacobian_at
-from ._stance import NO_GAINS, contact_response, point_stance, stance_accelerations
-from ._typing import Array
-from .robot import NB, Robot
+from .._state import as_array, as_one, as_state, leg_indices
+from .._typing import Array
+from ..kinematics.contacts import Contact, contact_radius, jacobian_at
+from ..robot import NB, Robot
+from .stance import NO_GAINS, contact_response, point_stance, stance_accelerations
 
 _LOCAL, _WORLD = pin.LOCAL, pin.LOCAL_WORLD_ALIGNED
 
@@ -51,17 +53,61 @@ class StanceDerivatives(NamedTuple):
     damped least-squares answer with its damping held."""
 
 
-def flight_derivatives_at(robot: Robot, q: Array, v: Array, tau: Array) -> FlightDerivatives:
-    """Pinocchio's derivatives of the articulated-body algorithm, for a checked state."""
-    force = np.concatenate([np.zeros(NB), tau])
+def flight_derivatives(
+    robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.ArrayLike
+) -> FlightDerivatives:
+    """Derivatives of `flight_dynamics` by q, v and tau.
+
+    A derivative by q is by the small motion d of `pinocchio.integrate(model, q, d)`.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (19,).
+        v: Velocity, shape (18,).
+        tau: Motor torques [N m], shape (12,).
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    """
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
+    force = np.concatenate([np.zeros(NB), as_array("tau", tau, robot.nu, ())])
     da_dq, da_dv, inverse = pin.computeABADerivatives(robot.model, robot.data, q, v, force)
     return FlightDerivatives(da_dq, da_dv, inverse[:, NB:])
 
 
-def stance_derivatives_at(
-    robot: Robot, state: tuple[Array, Array, Array], legs: tuple[int, ...], radius: float
+def stance_derivatives(
+    robot: Robot,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    tau: npt.ArrayLike,
+    *,
+    feet: Iterable[str] | None = None,
+    contact: Contact = "point",
 ) -> StanceDerivatives:
-    """Pinocchio's derivatives for point contacts; for rolling and singular ones, see below."""
+    """Derivatives of `stance_dynamics`' acceleration and contact forces by q, v and tau.
+
+    Pinocchio's own for point contacts; rolling and singular ones from its derivatives of RNEA and
+    kinematics.
+
+    A derivative by q is by the small motion d of `pinocchio.integrate(model, q, d)`.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (19,).
+        v: Velocity, shape (18,).
+        tau: Motor torques [N m], shape (12,).
+        feet: Legs in contact, in the order of lam; all if None, none if empty.
+        contact: "point" or "rolling", see `contact_jacobian`.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+        UnknownName: There is no such leg or contact.
+    """
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
+    state = (q, v, as_array("tau", tau, robot.nu, ()))
+    legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
     if legs and radius == 0.0:
         solver = point_stance(robot, legs)
         singular = np.bool_(solver.solve(*state).singular)

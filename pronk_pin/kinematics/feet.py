@@ -1,4 +1,4 @@
-"""Kinematics: feet from joints, joints from feet, trunk velocity from stance legs, whole body."""
+"""Kinematics of the legs: feet from joints, joints from feet, trunk velocity from stance legs."""
 
 from __future__ import annotations
 
@@ -9,25 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from ._legs import LegGeometry, leg_geometry, leg_motion, turn_y
-from ._state import as_array, as_q, as_state, known_name, leg_indices
-from ._typing import Array, BoolArray
-from ._whole_body import WholeBodySolution, inverse_kinematics
-from .conventions import rotation_matrix
-from .errors import InvalidInput
-from .robot import JOINTS, NB, Robot
-
-__all__ = [
-    "LegSolution",
-    "WholeBodySolution",
-    "foot_positions",
-    "foot_velocities",
-    "inverse_kinematics",
-    "leg_angle",
-    "leg_inverse_kinematics",
-    "leg_odometry",
-    "rotate_leg",
-]
+from .._state import as_array, as_q, as_state, known_name, leg_indices
+from .._typing import Array, BoolArray
+from ..conventions import rotation_matrix
+from ..errors import InvalidInput
+from ..robot import JOINTS, NB, Robot
+from .legs import LegGeometry, leg_geometry, leg_motion, turn_y
 
 Knee = Literal["backward", "forward"]
 """Which way a knee points; backward is a negative calf angle, as on the A1."""

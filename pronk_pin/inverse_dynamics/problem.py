@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from ._contacts import jacobian_at
-from ._typing import Array, IntArray
-from .conventions import rotation_matrix
-from .robot import NB, Robot
+from .._typing import Array, IntArray
+from ..conventions import rotation_matrix
+from ..kinematics.contacts import jacobian_at
+from ..robot import NB, Robot
 
 FORCE_WEIGHT = 1e-6
 """Cost of contact forces against joint torques [m^2]: small enough not to show, and it decides

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._typing import Array
-from .errors import InvalidInput
-from .robot import JOINTS, Robot
+from .._typing import Array
+from ..errors import InvalidInput
+from ..robot import JOINTS, Robot
 
 _AXES = {"hip": "RX", "thigh": "RY", "calf": "RY"}
 

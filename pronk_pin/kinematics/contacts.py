@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from ._state import as_one, as_q, as_state, known_name, leg_indices
-from ._typing import Array
-from .robot import Robot
+from .._state import as_one, as_q, as_state, known_name, leg_indices
+from .._typing import Array
+from ..robot import Robot
 
 Contact = Literal["point", "rolling"]
 """How a foot stands on the ground."""

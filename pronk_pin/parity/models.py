@@ -18,14 +18,12 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from ._mechanism import FLOATING, Mechanism, Point, State, read_pinocchio
-from ._mechanism_mujoco import read_mujoco
-from ._parity_table import Row, compare_tables, format_table, format_value
-from ._typing import Array
-from .errors import FileProblem, InvalidInput
-from .robot import Robot
-
-__all__ = ["ROUND_OFF", "SIX_DIGITS", "Model", "Parity", "Row", "compare_models"]
+from .._typing import Array
+from ..errors import FileProblem, InvalidInput
+from ..robot import Robot
+from .mechanism import FLOATING, Mechanism, Point, State, read_pinocchio
+from .mechanism_mujoco import read_mujoco
+from .table import Row, compare_tables, format_table, format_value
 
 Model: TypeAlias = Robot | str | Path | mujoco.MjModel
 """What can be compared."""

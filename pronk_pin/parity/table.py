@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ._mechanism import TRUNK, Foot, Joint, Link, Mechanism
+from .mechanism import TRUNK, Foot, Joint, Link, Mechanism
 
 Value: TypeAlias = float | tuple[float, ...] | str | None
 """A number, a vector, a word, or None where a model knows nothing of it."""

@@ -1,11 +1,4 @@
-"""Rigid-body dynamics of the floating-base robot: eq. (2) to (5) of the paper, and impacts.
-
-    M(q) a + H(q, v) v + G(q) = S tau + J^T lam
-
-`q`, `v` and `a` are in Pinocchio's layout (see `pronk_pin.robot`): the base's velocity and
-acceleration are in its own frame. Contact forces are in the world's axes, foot by foot. The paper
-writes J for our J^T.
-"""
+"""Forward dynamics: accelerations in flight and in stance, eq. (5), and impacts."""
 
 from __future__ import annotations
 
@@ -16,67 +9,21 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from ._contacts import (
-    Contact,
-    bias_at,
-    contact_bias,
-    contact_jacobian,
-    contact_radius,
-    jacobian_at,
-)
-from ._derivatives import (
-    FlightDerivatives,
-    StanceDerivatives,
-    flight_derivatives_at,
-    stance_derivatives_at,
-)
-from ._simulate import PhaseProblem, PhaseSimulation, Torque, integrate, sampled_torque
-from ._stance import (
+from .._state import as_array, as_one, as_state, leg_indices
+from .._typing import Array
+from ..errors import InvalidInput
+from ..kinematics.contacts import Contact, bias_at, contact_radius, jacobian_at
+from ..robot import NB, Robot
+from .stance import (
     NO_GAINS,
-    Baumgarte,
     Impact,
     StanceDynamics,
+    baumgarte_gains,
     contact_response,
     point_stance,
     stance_accelerations,
 )
-from ._state import as_array, as_one, as_state, leg_indices
-from ._terms import (
-    coriolis_matrix,
-    gravity,
-    mass_matrix,
-    nonlinear_effects,
-    quick_result,
-    selection_matrix,
-)
-from ._typing import Array
-from .errors import InvalidInput
-from .robot import NB, Robot
-
-__all__ = [
-    "Baumgarte",
-    "Contact",
-    "FlightDerivatives",
-    "Impact",
-    "PhaseSimulation",
-    "StanceDae",
-    "StanceDerivatives",
-    "StanceDynamics",
-    "contact_bias",
-    "contact_jacobian",
-    "coriolis_matrix",
-    "flight_derivatives",
-    "flight_dynamics",
-    "gravity",
-    "impact",
-    "mass_matrix",
-    "nonlinear_effects",
-    "selection_matrix",
-    "simulate_phase",
-    "stance_dae",
-    "stance_derivatives",
-    "stance_dynamics",
-]
+from .terms import mass_matrix, nonlinear_effects, quick_result, selection_matrix
 
 
 class StanceDae(NamedTuple):
@@ -149,7 +96,7 @@ def stance_dynamics(
         UnknownName: There is no such leg or contact.
     """
     legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
-    gains = NO_GAINS if baumgarte is None else _gains(baumgarte)
+    gains = baumgarte_gains(baumgarte)
     simple = bool(legs) and radius == 0.0 and gains == NO_GAINS
     if simple and np.ndim(tau) == 1:
         torque = as_array("tau", tau, robot.nu, ())
@@ -245,118 +192,3 @@ def impact(
     wanted = -(1.0 + restitution) * (jacobian @ v)
     impulse, change, singular = contact_response(robot, q, jacobian, wanted)
     return Impact(v + change, impulse, singular)
-
-
-def flight_derivatives(
-    robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.ArrayLike
-) -> FlightDerivatives:
-    """Derivatives of `flight_dynamics` by q, v and tau.
-
-    A derivative by q is by the small motion d of `pinocchio.integrate(model, q, d)`.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (19,).
-        v: Velocity, shape (18,).
-        tau: Motor torques [N m], shape (12,).
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
-    """
-    q, v = as_state(robot, q, v)
-    as_one("q", q)
-    return flight_derivatives_at(robot, q, v, as_array("tau", tau, robot.nu, ()))
-
-
-def stance_derivatives(
-    robot: Robot,
-    q: npt.ArrayLike,
-    v: npt.ArrayLike,
-    tau: npt.ArrayLike,
-    *,
-    feet: Iterable[str] | None = None,
-    contact: Contact = "point",
-) -> StanceDerivatives:
-    """Derivatives of `stance_dynamics`' acceleration and contact forces by q, v and tau.
-
-    A derivative by q is by the small motion d of `pinocchio.integrate(model, q, d)`.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (19,).
-        v: Velocity, shape (18,).
-        tau: Motor torques [N m], shape (12,).
-        feet: Legs in contact, in the order of lam; all if None, none if empty.
-        contact: "point" or "rolling", see `contact_jacobian`.
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
-        UnknownName: There is no such leg or contact.
-    """
-    q, v = as_state(robot, q, v)
-    as_one("q", q)
-    state = (q, v, as_array("tau", tau, robot.nu, ()))
-    return stance_derivatives_at(
-        robot, state, leg_indices(robot, feet), contact_radius(robot, contact)
-    )
-
-
-def simulate_phase(
-    robot: Robot,
-    q: npt.ArrayLike,
-    v: npt.ArrayLike,
-    tau: npt.ArrayLike | Torque,
-    *,
-    duration: float,
-    feet: Iterable[str] | None = None,
-    contact: Contact = "point",
-    baumgarte: tuple[float, float] | None = None,
-    samples: int = 101,
-    tolerance: float = 1e-11,
-) -> PhaseSimulation:
-    """Integrate flight or stance from a state under given torques, and report the drift.
-
-    The contacts neither slip nor open nor close: a phase has one set of feet. Touchdown is
-    `impact`, which also brings the feet to rest where the start has them moving.
-
-    Args:
-        robot: The robot.
-        q: Configuration at the start, shape (19,).
-        v: Velocity at the start, shape (18,).
-        tau: Motor torques [N m]: constant, shape (12,); samples at even times from start to end,
-            shape (m, 12), straight lines between; or a function of the time since the start [s].
-        duration: How long the phase lasts [s].
-        feet: Legs in contact; all if None, none if empty, which is flight.
-        contact: "point" or "rolling", see `contact_jacobian`.
-        baumgarte: Gains that pull drifting feet back, see `Baumgarte`; none if None.
-        samples: Number of samples returned, start and end included, at least 2.
-        tolerance: Relative and absolute tolerance of the integrator, DOP853.
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, a quaternion that is not normalised, or a duration,
-            number of samples or tolerance that makes no sense.
-        UnknownName: There is no such leg or contact.
-        IntegrationFailed: The integrator could not reach the end.
-    """
-    q, v = as_state(robot, q, v)
-    as_one("q", q)
-    if not 0.0 < duration < np.inf or samples < 2 or not 0.0 < tolerance < 1.0:
-        raise InvalidInput(
-            f"duration={duration}, samples={samples}, tolerance={tolerance}; give a positive "
-            "duration, 2 samples or more, and a tolerance between 0 and 1"
-        )
-    problem = PhaseProblem(
-        robot,
-        tau if callable(tau) else sampled_torque(robot, tau, duration),
-        leg_indices(robot, feet),
-        contact_radius(robot, contact),
-        NO_GAINS if baumgarte is None else _gains(baumgarte),
-    )
-    return integrate(problem, q, v, np.linspace(0.0, duration, samples), tolerance)
-
-
-def _gains(baumgarte: tuple[float, float]) -> Baumgarte:
-    gains = Baumgarte(*as_array("baumgarte", baumgarte, 2, ()).tolist())
-    if min(gains) < 0.0:
-        raise InvalidInput(f"baumgarte={baumgarte}; both gains must be 0 or positive")
-    return gains

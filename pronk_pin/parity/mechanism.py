@@ -14,9 +14,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from ._typing import Array
-from .errors import InvalidInput
-from .robot import NB, Robot
+from .._typing import Array
+from ..errors import InvalidInput
+from ..robot import NB, Robot
 
 TRUNK = "trunk"
 """The link that floats."""

@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 from proxsuite import proxqp
 
-from ._force_problem import ForceProblem, SaddlePoint
-from ._typing import Array, IntArray
-from .robot import NB
+from .._typing import Array, IntArray
+from ..robot import NB
+from .problem import ForceProblem, SaddlePoint
 
 _SIDES = 8
 _ACCURACY = 1e-9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,13 +12,13 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from ._contacts import jacobian_at
-from ._stance import Baumgarte, StanceDynamics, stance_accelerations
-from ._state import as_array
-from ._typing import Array
-from .errors import IntegrationFailed, InvalidInput
-from .kinematics import foot_positions
-from .robot import NB, Robot
+from .._state import as_array, as_one, as_state, leg_indices
+from .._typing import Array
+from ..errors import IntegrationFailed, InvalidInput
+from ..kinematics import foot_positions
+from ..kinematics.contacts import Contact, contact_radius, jacobian_at
+from ..robot import NB, Robot
+from .stance import Baumgarte, StanceDynamics, baumgarte_gains, stance_accelerations
 
 _EVALUATIONS = 300_000
 """Evaluations of the dynamics after which the motion counts as hopeless; a stride takes 1,000."""
@@ -27,7 +27,7 @@ Torque = Callable[[float], Array]
 """Motor torques [N m], shape (12,), at a time since the start [s]."""
 
 
-def sampled_torque(robot: Robot, tau: npt.ArrayLike, duration: float) -> Torque:
+def _sampled_torque(robot: Robot, tau: npt.ArrayLike, duration: float) -> Torque:
     """Torques as a function of time, from one (12,) or from samples at even times (m, 12).
 
     Raises:
@@ -78,8 +78,8 @@ class PhaseSimulation:
 
 
 @dataclass(frozen=True, eq=False)
-class PhaseProblem:
-    """What `integrate` integrates, all of it checked.
+class _PhaseProblem:
+    """What is integrated, all of it checked.
 
     Attributes:
         robot: The robot.
@@ -120,8 +120,62 @@ class PhaseProblem:
         return out
 
 
-def integrate(
-    problem: PhaseProblem, q: Array, v: Array, times: Array, tolerance: float
+def simulate_phase(
+    robot: Robot,
+    q: npt.ArrayLike,
+    v: npt.ArrayLike,
+    tau: npt.ArrayLike | Torque,
+    *,
+    duration: float,
+    feet: Iterable[str] | None = None,
+    contact: Contact = "point",
+    baumgarte: tuple[float, float] | None = None,
+    samples: int = 101,
+    tolerance: float = 1e-11,
+) -> PhaseSimulation:
+    """Integrate flight or stance from a state under given torques, and report the drift.
+
+    The contacts neither slip nor open nor close: a phase has one set of feet. Touchdown is
+    `impact`, which also brings the feet to rest where the start has them moving.
+
+    Args:
+        robot: The robot.
+        q: Configuration at the start, shape (19,).
+        v: Velocity at the start, shape (18,).
+        tau: Motor torques [N m]: constant, shape (12,); samples at even times from start to end,
+            shape (m, 12), straight lines between; or a function of the time since the start [s].
+        duration: How long the phase lasts [s].
+        feet: Legs in contact; all if None, none if empty, which is flight.
+        contact: "point" or "rolling", see `contact_jacobian`.
+        baumgarte: Gains that pull drifting feet back, see `Baumgarte`; none if None.
+        samples: Number of samples returned, start and end included, at least 2.
+        tolerance: Relative and absolute tolerance of the integrator, DOP853.
+
+    Raises:
+        InvalidInput: A wrong shape, NaN, a quaternion that is not normalised, or a duration,
+            number of samples or tolerance that makes no sense.
+        UnknownName: There is no such leg or contact.
+        IntegrationFailed: The integrator could not reach the end.
+    """
+    q, v = as_state(robot, q, v)
+    as_one("q", q)
+    if not 0.0 < duration < np.inf or samples < 2 or not 0.0 < tolerance < 1.0:
+        raise InvalidInput(
+            f"duration={duration}, samples={samples}, tolerance={tolerance}; give a positive "
+            "duration, 2 samples or more, and a tolerance between 0 and 1"
+        )
+    problem = _PhaseProblem(
+        robot,
+        tau if callable(tau) else _sampled_torque(robot, tau, duration),
+        leg_indices(robot, feet),
+        contact_radius(robot, contact),
+        baumgarte_gains(baumgarte),
+    )
+    return _integrate(problem, q, v, np.linspace(0.0, duration, samples), tolerance)
+
+
+def _integrate(
+    problem: _PhaseProblem, q: Array, v: Array, times: Array, tolerance: float
 ) -> PhaseSimulation:
     """Integrate from a state (q, v) by an adaptive Runge-Kutta method of order 8, sampled at times.
 
@@ -182,14 +236,14 @@ def _energy(robot: Robot, q: Array, v: Array) -> float:
     return float(pin.computeMechanicalEnergy(robot.model, robot.data, q, v))
 
 
-def _foot_drift(problem: PhaseProblem, q: Array) -> float:
+def _foot_drift(problem: _PhaseProblem, q: Array) -> float:
     feet = foot_positions(problem.robot, q)[:, list(problem.legs)]  # (n, feet, 3)
     moved = feet - feet[0]
     distance = moved[..., 2] if problem.radius else np.linalg.norm(moved, axis=-1)
     return float(np.abs(distance).max(initial=0.0))
 
 
-def _contact_speed(problem: PhaseProblem, q: Array, v: Array) -> float:
+def _contact_speed(problem: _PhaseProblem, q: Array, v: Array) -> float:
     speed = [
         jacobian_at(problem.robot, q_row, problem.legs, problem.radius) @ v_row
         for q_row, v_row in zip(q, v, strict=True)

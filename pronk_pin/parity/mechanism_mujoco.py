@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from ._actuators import actuator_kind, joint_actuators, through_gears, torque_limits
-from ._mechanism import FLOATING, TRUNK, Dynamics, Foot, Joint, Link, Mechanism, Point, State
-from ._typing import Array
-from .conventions import rotation_matrix
-from .errors import InvalidInput
-from .robot import NB
+from .._typing import Array
+from ..conventions import rotation_matrix
+from ..errors import InvalidInput
+from ..robot import NB
+from .actuators import actuator_kind, joint_actuators, through_gears, torque_limits
+from .mechanism import FLOATING, TRUNK, Dynamics, Foot, Joint, Link, Mechanism, Point, State
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _KINDS = {int(mujoco.mjtJoint.mjJNT_HINGE): "hinge", int(mujoco.mjtJoint.mjJNT_SLIDE): "slide"}

@@ -13,11 +13,12 @@ import numpy as np
 import pinocchio as pin
 import scipy.linalg
 
-from ._contacts import bias_at, jacobian_at
-from ._state import REFUSALS, sound_base
-from ._typing import Array, BoolArray
-from .kinematics import foot_positions
-from .robot import NB, Robot
+from .._state import REFUSALS, as_array, sound_base
+from .._typing import Array, BoolArray
+from ..errors import InvalidInput
+from ..kinematics import foot_positions
+from ..kinematics.contacts import bias_at, jacobian_at
+from ..robot import NB, Robot
 
 _SINGULAR = 1e-10
 """Relative eigenvalue of J M^-1 J^T below which a stance counts as singular."""
@@ -42,6 +43,20 @@ class Baumgarte(NamedTuple):
 
 NO_GAINS = Baumgarte(0.0, 0.0)
 """Feet at rest, whatever has drifted."""
+
+
+def baumgarte_gains(baumgarte: tuple[float, float] | None) -> Baumgarte:
+    """Gains as a user gives them.
+
+    Raises:
+        InvalidInput: Not two numbers, or negative ones.
+    """
+    if baumgarte is None:
+        return NO_GAINS
+    gains = Baumgarte(*as_array("baumgarte", baumgarte, 2, ()).tolist())
+    if min(gains) < 0.0:
+        raise InvalidInput(f"baumgarte={baumgarte}; both gains must be 0 or positive")
+    return gains
 
 
 class StanceDynamics(NamedTuple):

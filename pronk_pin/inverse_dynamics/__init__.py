@@ -1,0 +1,19 @@
+"""Motor torques and contact forces for a given motion: eq. (2) solved for tau and lambda."""
+
+from .solve import (
+    GUIDE_COORDINATES,
+    SAGITTAL_GUIDE,
+    Feedforward,
+    InverseDynamics,
+    feedforward,
+    inverse_dynamics,
+)
+
+__all__ = [
+    "GUIDE_COORDINATES",
+    "SAGITTAL_GUIDE",
+    "Feedforward",
+    "InverseDynamics",
+    "feedforward",
+    "inverse_dynamics",
+]

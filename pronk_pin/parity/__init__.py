@@ -1,0 +1,6 @@
+"""Are two models the same robot? Masses, joints and motors side by side, and M, h and J."""
+
+from .models import ROUND_OFF, SIX_DIGITS, Model, Parity, compare_models
+from .table import Row
+
+__all__ = ["ROUND_OFF", "SIX_DIGITS", "Model", "Parity", "Row", "compare_models"]
