@@ -50,7 +50,11 @@ class _Inertia(NamedTuple):
 
     def mean(self, other: _Inertia) -> _Inertia:
         """Halfway to another one."""
-        return _Inertia(*(0.5 * (a + b) for a, b in zip(self, other, strict=True)))
+        return _Inertia(
+            0.5 * (self.mass + other.mass),
+            0.5 * (self.first + other.first),
+            0.5 * (self.second + other.second),
+        )
 
     def mirrored(self) -> _Inertia:
         """Seen in the mirror y = 0."""

@@ -74,15 +74,15 @@ PRONK = (
 
 PITCHING_PRONK = (
     dataclasses.replace(PRONK[0], intervals=20, order=9),
-    dataclasses.replace(PRONK[1], intervals=20, order=13),
+    dataclasses.replace(PRONK[1], intervals=20, order=15),
 )
 """The same on a finer mesh: when the trunk may pitch, the legs move more."""
 
 BOUND = (
     ContactPhase("front stance", ("front",), (0.1, 0.2), intervals=16, order=9),
-    ContactPhase("gathered flight", (), (0.05, 0.2), intervals=16, order=12),
+    ContactPhase("gathered flight", (), (0.05, 0.2), intervals=16, order=8),
     ContactPhase("rear stance", ("rear",), (0.1, 0.2), intervals=16, order=9),
-    ContactPhase("extended flight", (), (0.05, 0.2), intervals=16, order=12),
+    ContactPhase("extended flight", (), (0.05, 0.2), intervals=16, order=8),
 )
 """Front and rear legs in turn, with a flight after each."""
 
