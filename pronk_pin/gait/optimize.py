@@ -31,13 +31,14 @@ _COLD: dict[str, Any] = {
     "show_eval_warnings": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.max_iter": 200,
+    "ipopt.max_iter": 300,
     "ipopt.tol": 1e-8,
     "ipopt.constr_viol_tol": 1e-9,
     # Limits are limits: IPOPT would by default relax each by 1e-8 of its size.
     "ipopt.bound_relax_factor": 0.0,
     # The crude guess is far off: a monotone barrier takes twice the iterations.
     "ipopt.mu_strategy": "adaptive",
+    "ipopt.adaptive_mu_globalization": "kkt-error",
     "ipopt.mu_init": 0.5,
 }
 _WARM = _COLD | {
@@ -181,16 +182,23 @@ def fit_phase(solution: GaitSolution, phase: ContactPhase) -> GaitPhase:
     return _fitted(solution.problem, phase, solution.motions[phase.name], solution.values)
 
 
-def resampled(solution: GaitSolution, intervals: Sequence[int]) -> dict[str, Array]:
-    """A solution's unknowns on another mesh, as a guess for it."""
-    values = dict(solution.values)
-    for phase, n in zip(solution.problem.sequence, intervals, strict=True):
-        old, new = node_phases(phase.intervals), node_phases(n)
-        for key in ("q", "v", "a", "tau", "lam"):
-            name = f"{phase.name}.{key}"
-            if name in values:
-                values[name] = np.asarray(CubicSpline(old, values[name])(new))
-    return values
+def resampled(solution: GaitSolution, intervals: Sequence[int]) -> SolverState:
+    """A solution on another mesh, for a warm start there: the unknowns and their bounds'
+    multipliers interpolated, the constraints' multipliers left to the solver."""
+    problem, before = solution.problem, _program(solution.problem)
+    program = _program(problem.remeshed(intervals))
+
+    def moved(vector: Array) -> Array:
+        values = before.unpack(vector)
+        for phase, n in zip(problem.sequence, intervals, strict=True):
+            old, new = node_phases(phase.intervals), node_phases(n)
+            for key in ("q", "v", "a", "tau", "lam"):
+                name = f"{phase.name}.{key}"
+                if name in values:
+                    values[name] = np.asarray(CubicSpline(old, values[name])(new))
+        return program.pack(values)
+
+    return SolverState(moved(solution.state.x), moved(solution.state.lam_x), np.zeros(program.size))
 
 
 def _check_alike(initial: GaitProblem, problem: GaitProblem) -> None:

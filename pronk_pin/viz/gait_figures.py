@@ -25,6 +25,7 @@ FORMATS = ("png", "svg", "pdf")
 _SAMPLES = 81
 _FRAMES = 7
 _SHOWN_SPEED = 0.5  # m/s, unless another is asked for
+_ARROW = 2e-3  # m/N
 _PAIRS = ("front", "rear")
 
 
@@ -67,7 +68,7 @@ def write_gait_figures(
         path = folder / f"{library.robot}-{library.metadata.get('gait', 'gait')}-{name}.{suffix}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, dpi=150)
+            figure.savefig(path, dpi=150, bbox_inches="tight")
         except OSError as error:
             raise cannot_write(path, error, "choose another --folder") from error
         paths.append(path)
@@ -105,7 +106,7 @@ def stride_figure(library: GaitLibrary, robot: Robot) -> Figure:
     kind = library.metadata.get("gait", "gait")
     figure.suptitle(
         f"{robot.name.upper()}, {kind}, {library.base} base, apex {library.apex:g} m: one stride, "
-        "left legs"
+        "left legs; grey: on the ground"
     )
     return figure
 
@@ -120,7 +121,7 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
         robot: Its robot.
         base: How the trunk moves, for the title.
     """
-    figure = Figure(figsize=(11.0, 3.4), layout="constrained")
+    figure = Figure(figsize=(11.0, 2.5), layout="constrained")
     axes = figure.subplots()
     times = np.linspace(0.0, gait.duration, _FRAMES, endpoint=False)
     spread = 0.62  # m between two poses, on top of how far the robot went
@@ -131,7 +132,7 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
         _pose(axes, robot, motion, shift, colors[frame])
         axes.annotate(
             f"{1e3 * time:.0f} ms\n{name}",
-            (motion.q[0, 0] + shift, 0.46),
+            (motion.q[0, 0] + shift, -0.05),
             ha="center",
             va="top",
             fontsize=8,
@@ -148,12 +149,13 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
     axes.plot(x, trunk[drawn, 1], ":", color="0.5", lw=1.0, label="trunk")
     axes.axhline(0.0, color="0.3", lw=1.0)
     axes.set_aspect("equal")
-    axes.set_ylim(-0.03, 0.47)
+    axes.set_ylim(-0.19, 0.42)
+    axes.set_yticks([0.0, 0.2, 0.4])
     axes.set_xticks([])
     axes.set_ylabel("height [m]")
     axes.set_title(
         f"{robot.name.upper()} at {gait.speed:g} m/s, {base} base, apex {gait.apex:g} m: a stride "
-        f"of {1e3 * gait.duration:.0f} ms, poses spread out; arrows: ground forces (1 m = 1 kN)",
+        f"of {1e3 * gait.duration:.0f} ms, poses spread out; arrows: ground forces",
         fontsize=9,
     )
     return figure
@@ -207,11 +209,12 @@ def _curves(motion: Motion, left: list[int]) -> dict[str, Array]:
 
 
 def _phases(axes: dict[str, Axes], library: GaitLibrary) -> None:
-    """Shade the phases with feet on the ground, of the middle gait."""
+    """Shade the phases with feet on the ground, the panel's own or any, of the middle gait."""
     gait = library.gaits[len(library.gaits) // 2]
-    for one in axes.values():
+    for key, one in axes.items():
         for phase, start in zip(gait.phases, _starts(gait), strict=True):
-            if phase.feet:
+            pairs = {_PAIRS[0] if leg.startswith("F") else _PAIRS[1] for leg in phase.feet}
+            if pairs and (key.split()[0] in pairs or key.split()[0] not in _PAIRS):
                 end = (start + phase.duration) / gait.duration
                 one.axvspan(start / gait.duration, end, color="0.93", lw=0, zorder=0)
 
@@ -264,7 +267,7 @@ def _pose(axes: Axes, robot: Robot, motion: Motion, shift: float, color: Array) 
         line = np.array(points)
         axes.plot(line[:, 0] + shift, line[:, 2], color=color, lw=2.2, solid_capstyle="round")
         axes.plot(feet[leg, 0] + shift, feet[leg, 2], "o", color=color, ms=3.5)
-        force = 1e-3 * motion.lam[0, leg]
+        force = _ARROW * motion.lam[0, leg]
         if np.linalg.norm(force) > 1e-3:
             axes.annotate(
                 "",

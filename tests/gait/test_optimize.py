@@ -16,13 +16,14 @@ from pronk_pin.gait import (
     GaitLibrary,
     GaitProblem,
     GaitSolution,
+    gait_problem,
     optimize_gait,
     vertical_hop,
 )
 from pronk_pin.gait.checks import TOLERANCE
 from pronk_pin.gait.reintegration import guided_rows
 from pronk_pin.kinematics import foot_positions
-from pronk_pin.robot import Robot
+from pronk_pin.robot import Robot, load_robot
 
 COARSE = (4, 6)
 """A mesh that is quick to solve, where accuracy does not matter."""
@@ -97,6 +98,31 @@ def test_spherical_feet_roll_and_point_feet_stay(solution: GaitSolution) -> None
     np.testing.assert_allclose(travel(solution)[:, 0], robot.foot_radius * turned, rtol=0.02)
     assert np.all(np.abs(travel(solution)[:, 0]) > 1e-3)
     np.testing.assert_allclose(travel(point), 0.0, atol=1e-4)
+
+
+def test_unlike_legs_get_torques_and_impulses_of_their_own() -> None:
+    """The Go1's URDF is not its own mirror image; the motion is, and obeys every row."""
+    go1 = load_robot("go1")
+    found = optimize_gait(GaitProblem(go1, 0.3).remeshed(COARSE))
+    assert found.audit(refine=False)["18-DoF residual"].value < 1e-8
+    tau = found.motions["flight"].tau
+    assert np.max(np.abs(tau[:, 1:3] - tau[:, 4:6])) > 0.01
+    before, after = found.motions["flight"], found.motions["stance"]
+    rows, q = guided_rows(go1), after.q[0]
+    jump = pin.crba(go1.model, go1.data, q) @ (after.v[0] - before.v[-1])
+    push = contact_jacobian(go1, q, contact="rolling").T @ found.impulses["stance"].ravel()
+    np.testing.assert_allclose(push[rows], jump[rows], atol=1e-8)
+
+
+def test_a_pitching_trunk_has_no_moment_about_its_pitch_axis(robot: Robot) -> None:
+    problem = gait_problem(robot, 0.0, gait="bound").remeshed((6, 6, 6, 6))
+    found = optimize_gait(problem)
+    audit = found.audit(refine=False)
+    assert audit["18-DoF residual"].value < 1e-8
+    # All that the guide still takes is what the trunk's centre of mass lies off the mirror plane.
+    assert audit["guide"].value < 1.0
+    pitch = [2 * np.arcsin(motion.q[:, 4]) for motion in found.motions.values()]
+    assert 0.1 < np.max(np.abs(np.concatenate(pitch))) <= problem.pitch_limit + 1e-8
 
 
 def test_an_impossible_gait_names_what_fights(robot: Robot) -> None:
