@@ -5,8 +5,9 @@ from .build import build_library
 from .checks import Audit, Check
 from .describe import describe_gait, describe_library
 from .gait import Gait, GaitPhase, Motion
+from .guess import vertical_hop
 from .library import GaitLibrary, load_library
-from .optimize import GaitSolution, SolverState, optimize_gait, vertical_hop
+from .optimize import GaitSolution, SolverState, optimize_gait
 from .problem import BOUND, PRONK, ContactPhase, GaitProblem
 from .residual import GaitResidual, gait_residual
 from .style import SPEEDS, STYLES, Style, gait_problem, known_base, load_style, number_range

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from .._typing import Array
 from ..dynamics import contact_jacobian
@@ -25,6 +24,7 @@ from .gait import Motion
 from .optimize import GaitSolution, fit_phase, optimize_gait, resampled
 from .problem import ContactPhase
 from .reintegration import drift, guided_rows
+from .residual import missing_forces
 
 ORDERS = range(4, 17)
 """Bezier orders that `bezier_orders` tries."""
@@ -84,7 +84,7 @@ def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
             fitted = fit_phase(solution, dataclasses.replace(phase, order=order))
             q = fitted.motion(robot, s).q
             joints = float(np.max(np.abs(q - motion.q)[:, NB + 1 :]))
-            height = np.array([foot_positions(robot, row) for row in q])[..., 2] - feet[..., 2]
+            height = foot_positions(robot, q)[..., 2] - feet[..., 2]
             losses.append(BezierLoss(order, joints, float(np.max(np.abs(height)))))
         found[phase.name] = tuple(losses)
     return found
@@ -124,16 +124,9 @@ def _residual(solution: GaitSolution) -> tuple[Check, Check]:
     robot, contact = solution.problem.robot, solution.problem.contact
     rows, free, guide = guided_rows(robot, solution.problem.base), {}, {}
     for name, motion in solution.motions.items():
-        residuals = []
-        for q, v, a, tau, lam in zip(
-            motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True
-        ):
-            force = pin.rnea(robot.model, robot.data, q, v, a).copy()
-            force -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
-            force[NB:] -= tau
-            residuals.append(force)
-        free[name] = (motion, np.array(residuals)[:, rows])
-        guide[name] = (motion, np.delete(np.array(residuals), rows, axis=1))
+        missing = missing_forces(robot, motion, contact)
+        free[name] = (motion, missing[:, rows])
+        guide[name] = (motion, np.delete(missing, rows, axis=1))
     return _worst("18-DoF residual", free), _worst("guide", guide)
 
 
@@ -272,4 +265,4 @@ def _use(solution: GaitSolution) -> tuple[Check, ...]:
 
 def _feet(robot: Robot, motion: Motion) -> Array:
     """Centres of the feet at the nodes [m], shape (nodes, 4, 3)."""
-    return np.array([foot_positions(robot, q) for q in motion.q])
+    return foot_positions(robot, motion.q)

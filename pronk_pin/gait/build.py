@@ -2,7 +2,7 @@
 
 Each gait is a file of its own as soon as it is solved and audited, so that a build which was
 interrupted goes on where it was. A gait starts from the solution of its neighbour on the way to the
-slowest gait at the home apex; where the neighbour is another robot's or failed, from a crude guess.
+slowest gait at the home apex; where there is none, or that fails, from a crude guess.
 """
 
 from __future__ import annotations

@@ -13,17 +13,16 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from .._typing import Array
-from ..dynamics import contact_jacobian
 from ..errors import GaitNotFound, InvalidInput
-from ..robot import NB
-from . import bezier
 from .checks import TOLERANCE, Audit
 from .collocation import node_phases, transcribe
 from .elastic import fights, remedies
-from .folded_model import FoldedModel, fold
-from .gait import Gait, GaitPhase, Motion, planar_state
-from .problem import PAIRS, ContactPhase, GaitProblem
+from .folded_model import FoldedModel
+from .gait import Gait, GaitPhase, Motion
+from .guess import vertical_hop
+from .problem import ContactPhase, GaitProblem
 from .transcription import Transcription, Violation
+from .unfold import fitted, fold_problem, touchdown_impulse, unfolded
 
 _COLD: dict[str, Any] = {
     "print_time": False,
@@ -120,7 +119,7 @@ class GaitSolution:
     @property
     def model(self) -> FoldedModel:
         """The folded model it was found with."""
-        return _model(self.problem)
+        return fold_problem(self.problem)
 
 
 def optimize_gait(
@@ -155,15 +154,15 @@ def optimize_gait(
 
 
 def _solution(problem: GaitProblem, state: SolverState, found: _Found) -> GaitSolution:
-    program, model = _program(problem), _model(problem)
+    program, model = _program(problem), fold_problem(problem)
     values = program.unpack(state.x)
-    motions = {phase.name: _unfolded(model, values, phase) for phase in problem.sequence}
+    motions = {phase.name: unfolded(model, values, phase) for phase in problem.sequence}
     impulses = {
-        phase.name: _impulse(problem, index, motions, values)
+        phase.name: touchdown_impulse(problem, index, motions, values)
         for index, phase in enumerate(problem.sequence)
         if problem.landing(index)
     }
-    phases = [_fitted(problem, phase, motions[phase.name], values) for phase in problem.sequence]
+    phases = [fitted(problem, phase, motions[phase.name], values) for phase in problem.sequence]
     return GaitSolution(
         problem=problem,
         gait=Gait(problem.robot.name, problem.speed, problem.apex, tuple(phases)),
@@ -179,7 +178,7 @@ def _solution(problem: GaitProblem, state: SolverState, found: _Found) -> GaitSo
 
 def fit_phase(solution: GaitSolution, phase: ContactPhase) -> GaitPhase:
     """The Bezier form of a phase of a solution, with the order that `phase` asks for."""
-    return _fitted(solution.problem, phase, solution.motions[phase.name], solution.values)
+    return fitted(solution.problem, phase, solution.motions[phase.name], solution.values)
 
 
 def resampled(solution: GaitSolution, intervals: Sequence[int]) -> SolverState:
@@ -272,10 +271,6 @@ def _parameters(problem: GaitProblem) -> Array:
     return np.array([problem.speed, problem.apex])
 
 
-def _model(problem: GaitProblem) -> FoldedModel:
-    return fold(problem.robot, problem.contact, problem.base)
-
-
 def _program(problem: GaitProblem) -> Transcription:
     """The program of all problems of this structure."""
     return transcribe(_structure(problem))
@@ -291,115 +286,3 @@ def _solver(structure: GaitProblem, *, warm: bool) -> ca.Function:
     cold = _solver(structure, warm=False)
     derivatives = {option: cold.get_function(name) for option, name in _DERIVATIVES.items()}
     return ca.nlpsol("solver", "ipopt", nlp, _WARM | derivatives)
-
-
-def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
-    """A crude first guess: the trunk hops on parabolas, the legs keep the standing posture.
-
-    Returns:
-        The unknowns of the transcription, each (nodes, rows).
-    """
-    robot, model = problem.robot, _model(problem)
-    standing = robot.standing[NB + 1 :][model.joint_rows()]
-    durations = [
-        phase.duration[0] if not phase.stands else 0.5 * sum(phase.duration)
-        for phase in problem.sequence
-    ]
-    flights = [t for phase, t in zip(problem.sequence, durations, strict=True) if not phase.stands]
-    flight = float(np.mean(flights))
-    rise = robot.gravity * flight**2 / 8
-    load = sum(2 * len(p.stands) * t for p, t in zip(problem.sequence, durations, strict=True))
-    push = robot.mass * robot.gravity * sum(durations) / load
-    values, start = {}, 0.0
-    for index, (phase, duration) in enumerate(zip(problem.sequence, durations, strict=True)):
-        name, s = phase.name, node_phases(phase.intervals)
-        dip = robot.gravity * flight * duration / 8  # as deep as the speed at take-off asks
-        height = -dip if phase.stands else rise
-        z = problem.apex - rise + height * 4 * s * (1 - s)
-        x = start + problem.speed * duration * s
-        pitch = np.zeros((len(s), model.nb - 2))
-        q = np.column_stack([x, z, pitch, np.tile(standing, (len(s), 1))])
-        v = np.gradient(q, s * duration, axis=0)
-        values[f"{name}.q"], values[f"{name}.v"] = q, v
-        values[f"{name}.a"] = np.gradient(v, s * duration, axis=0)
-        values[f"{name}.tau"] = np.zeros((len(s), model.nl))
-        values[f"{name}.duration"] = np.array([duration])
-        if phase.stands:
-            values[f"{name}.lam"] = np.tile([0.0, 0.0, push], (len(s), len(phase.stands)))
-        if problem.landing(index):
-            values[f"{name}.impulse"] = np.zeros(3 * len(phase.stands))
-        start += problem.speed * duration
-    return values
-
-
-def _unfolded(model: FoldedModel, values: dict[str, Array], phase: ContactPhase) -> Motion:
-    """The whole robot's motion at the nodes of a phase."""
-    name, robot = phase.name, model.robot
-    curves = []
-    for key in "qva":
-        folded = values[f"{name}.{key}"]
-        base = np.zeros((len(folded), 3))
-        base[:, : model.nb] = folded[:, : model.nb]
-        curves.append((base, model.unfold_joints(folded[:, model.nb :])))
-    q, v, a = planar_state(robot, *curves)
-    lam = values.get(f"{name}.lam", np.zeros((len(q), 0)))
-    kept = [values[f"{name}.{key}"].T for key in "qva"]
-    apart = np.array(model.asymmetry.map(len(q))(*kept)).T  # (n, 6)
-    return Motion(
-        t=float(values[f"{name}.duration"][0, 0]) * node_phases(phase.intervals),
-        q=q,
-        v=v,
-        a=a,
-        tau=model.unfold_torques(values[f"{name}.tau"], apart),
-        lam=_forces(model, phase, lam),
-    )
-
-
-def _impulse(
-    problem: GaitProblem, index: int, motions: Mapping[str, Motion], values: dict[str, Array]
-) -> Array:
-    """Touchdown impulses on all feet at the beginning of a phase [N s], shape (4, 3).
-
-    The motors give none, so that the feet of unlike legs bear unlike impulses.
-    """
-    robot, model, phase = problem.robot, _model(problem), problem.sequence[index]
-    q, v = (values[f"{phase.name}.{key}"][0] for key in "qv")
-    jump = np.array(model.jump_asymmetry(q, v - values[f"{problem.before(index).name}.v"][-1]))
-    impulse: Array = _forces(model, phase, values[f"{phase.name}.impulse"])[0]
-    apart = model.unfold_torques(np.zeros(model.nl), jump.ravel())
-    for leg in problem.feet(phase):
-        i = robot.legs.index(leg)
-        joints = slice(3 * i, 3 * i + 3)
-        whole = motions[phase.name].q[0]
-        jacobian = contact_jacobian(robot, whole, feet=[leg], contact=problem.contact)
-        impulse[i] += np.linalg.solve(jacobian[:, NB:][:, joints].T, apart[joints])
-    return impulse
-
-
-def _forces(model: FoldedModel, phase: ContactPhase, standing: Array) -> Array:
-    """Forces on all feet (n, 4, 3) from those of the standing, kept ones (n, 3 feet)."""
-    folded = np.zeros((len(standing), len(model.legs), 3))
-    legs = [PAIRS.index(pair) for pair in phase.stands]
-    folded[:, legs] = standing.reshape(len(standing), len(legs), 3)
-    return model.unfold_forces(folded.reshape(len(standing), -1))
-
-
-def _fitted(
-    problem: GaitProblem, phase: ContactPhase, motion: Motion, values: Mapping[str, Array]
-) -> GaitPhase:
-    """Bezier form of a phase; the motion's ends are met exactly, in value and rate."""
-    duration, order, nb = float(motion.t[-1]), phase.order, _model(problem).nb
-    s = motion.t / duration
-    base, rates = np.zeros((2, len(s), 3))
-    base[:, :nb] = values[f"{phase.name}.q"][:, :nb]
-    rates[:, :nb] = values[f"{phase.name}.v"][:, :nb]
-    joints, joint_rates = motion.q[:, NB + 1 :], motion.v[:, NB:]
-    return GaitPhase(
-        name=phase.name,
-        feet=problem.feet(phase),
-        duration=duration,
-        joints=bezier.fit(s, joints, order, rates=joint_rates * duration, pinned=2),
-        base=bezier.fit(s, base, order, rates=rates * duration, pinned=2),
-        tau=bezier.fit(s, motion.tau, order),
-        lam=bezier.fit(s, motion.lam, order),
-    )

@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from .._typing import Array
 from ..dynamics import Contact, contact_jacobian
+from ..kinematics import foot_positions
 from ..robot import NB, Robot
-from .gait import Gait
+from .gait import Gait, Motion
 from .problem import Base
 from .reintegration import guided_rows
 
@@ -23,6 +25,17 @@ class GaitResidual(NamedTuple):
     """In the joints, and about the trunk's pitch where it is free [N m]."""
     height: float
     """Distance of the standing feet from the ground [m]."""
+
+
+def missing_forces(robot: Robot, motion: Motion, contact: Contact) -> Array:
+    """What a motion, its torques and its contact forces leave in eq. (2), shape (n, 18)."""
+    missing = []
+    for q, v, a, tau, lam in zip(motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True):
+        force = pin.rnea(robot.model, robot.data, q, v, a).copy()
+        force -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
+        force[NB:] -= tau
+        missing.append(force)
+    return np.array(missing)
 
 
 def gait_residual(
@@ -46,17 +59,11 @@ def gait_residual(
     force = moment = height = 0.0
     for phase in gait.phases:
         motion = phase.motion(robot, np.linspace(0.0, 1.0, samples))
-        standing = [robot.foot_ids[robot.legs.index(leg)] for leg in phase.feet]
-        for q, v, a, tau, lam in zip(
-            motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True
-        ):
-            missing = pin.rnea(robot.model, robot.data, q, v, a).copy()
-            missing -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
-            missing[NB:] -= tau
-            force = max(force, float(np.max(np.abs(missing[rows[:2]]))))
-            moment = max(moment, float(np.max(np.abs(missing[rows[2:]]))))
-            pin.framesForwardKinematics(robot.model, robot.data, q)
-            for foot in standing:
-                above = robot.data.oMf[foot].translation[2] - robot.foot_radius
-                height = max(height, abs(float(above)))
+        missing = np.abs(missing_forces(robot, motion, contact)[:, rows])
+        force = max(force, float(np.max(missing[:, :2])))
+        moment = max(moment, float(np.max(missing[:, 2:])))
+        if phase.feet:
+            legs = [robot.legs.index(leg) for leg in phase.feet]
+            above = foot_positions(robot, motion.q)[:, legs, 2] - robot.foot_radius
+            height = max(height, float(np.max(np.abs(above))))
     return GaitResidual(force, moment, height)

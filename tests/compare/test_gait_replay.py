@@ -105,6 +105,6 @@ def test_every_gait_keeps_its_speed_and_apex_in_mujoco(robot: Robot) -> None:
 
 
 def test_a_gait_of_point_feet_does_not_keep_its_speed(robot: Robot) -> None:
-    """The feet are spheres that roll: 10 % of the speed, which is why the gaits roll too."""
+    """The feet are spheres that roll: 7 % of the speed here, which is why the gaits roll too."""
     gait = optimize_gait(GaitProblem(robot, 0.4, contact="point")).gait
     assert abs(replay(robot, [gait]).speed[0] / 0.4 - 1.0) > 0.05
