@@ -105,7 +105,7 @@ class GaitNotFound(PronkError):
         status: What the solver said.
         violations: Worst violation of each named constraint where the solver stopped.
         fights: By how much which demands have to give way so that a gait exists, in their units;
-            empty where that was not asked for, or has no answer either.
+            empty where none has to, None where that was not asked for or has no answer.
     """
 
     def __init__(
@@ -117,10 +117,16 @@ class GaitNotFound(PronkError):
         remedies: Iterable[str] = (),
     ) -> None:
         self.speed, self.status = speed, status
-        self.violations, self.fights = dict(violations), dict(fights or {})
+        self.violations = dict(violations)
+        self.fights = None if fights is None else dict(fights)
         if self.fights:
             gives = ", ".join(f"{name} by {value:.2g}" for name, value in self.fights.items())
             advice = f"these demands fight, and must give way: {gives}; {'; '.join(remedies)}"
+        elif self.fights is not None:
+            advice = (
+                "its demands do not fight, a gait exists on a coarse mesh: start from the solution "
+                "of a neighbouring speed or apex"
+            )
         else:
             worst = sorted(violations.items(), key=lambda item: -item[1])[:3]
             listed = ", ".join(f"{name} {value:.1e}" for name, value in worst)

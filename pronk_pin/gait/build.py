@@ -204,7 +204,7 @@ def _solve_all(
         (speed, apex), first = next(iter(failed.items()))
         others = ", ".join(f"{v:g} m/s at {h:g} m" for v, h in list(failed)[1:])
         note = f"apex {apex:g} m" + (f"; nor at {others}" if others else "")
-        if keeps:
+        if keeps and len(failed) < len(tasks):
             place = tasks[speed, apex].path.parent
             note += f"; the other {len(tasks) - len(failed)} gaits are in {place}"
         raise first.with_note(note)

@@ -35,8 +35,8 @@ DEMANDS: Mapping[str, tuple[float, str]] = {
 """What may give way: the size of it that counts as one, in its unit, and what to try. The demand
 "average speed" is kept as a distance over the stride [m]."""
 
-_WEIGHT, _REGULAR = 100.0, 0.1
-"""Weights of what gives way, and of the gait's own cost: the problem needs some curvature."""
+_REGULAR = 0.1
+"""Weight of the gait's own cost, beside what gives way: the problem needs some curvature."""
 
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
@@ -47,15 +47,18 @@ _OPTIONS: dict[str, Any] = {
     "ipopt.max_iter": 150,
     "ipopt.tol": 1e-5,
     "ipopt.constr_viol_tol": 1e-6,
-    "ipopt.mu_strategy": "monotone",
-    "ipopt.mu_init": 0.1,
 }
+_SLOW: dict[str, Any] = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 0.1}
+_QUICK: dict[str, Any] = {"ipopt.mu_strategy": "adaptive"}
+
+_ATTEMPTS = ((False, _SLOW), (True, _SLOW), (False, _QUICK), (True, _QUICK))
+"""Whether to square what gives way, and how the solver goes about it, until one succeeds."""
 
 NOTABLE = 0.02
 """Share of a demand's size below which it does not count as giving way."""
 
 
-def fights(program: Transcription, start: Array, p: Array) -> dict[str, float]:
+def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] | None:
     """By how much which demands have to give way, in their units, the worst first.
 
     Args:
@@ -64,7 +67,8 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float]:
         p: Its parameters.
 
     Returns:
-        Nothing where even that has no answer.
+        Empty where nothing has to: then there is a gait, which the solver did not find. None where
+        this has no answer either.
     """
     names = [name for name in DEMANDS if name in program.names]
     slack = ca.SX.sym("slack", len(names))
@@ -86,14 +90,15 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float]:
         upper.append(np.tile(high, unknown.symbol.shape[1]))
     nlp = program.nlp
     sizes = [c.expression.numel() for c in constraints]
-    for measure in (ca.sum1(slack), 0.1 * ca.sumsqr(slack)):
+    for squares, strategy in _ATTEMPTS:
+        measure = 10.0 * ca.sumsqr(slack) if squares else 100.0 * ca.sum1(slack)
         problem = {
             "x": ca.vertcat(nlp["x"], slack),
             "p": nlp["p"],
-            "f": _WEIGHT * measure + _REGULAR * nlp["f"],
+            "f": measure + (_REGULAR / 10 if squares else _REGULAR) * nlp["f"],
             "g": ca.vertcat(*[ca.vec(c.expression) for c in constraints]),
         }
-        solver = ca.nlpsol("elastic", "ipopt", problem, _OPTIONS)
+        solver = ca.nlpsol("elastic", "ipopt", problem, _OPTIONS | strategy)
         result = solver(
             x0=np.concatenate([start, np.ones(len(names))]),
             lbx=np.concatenate([*lower, np.zeros(len(names))]),
@@ -106,12 +111,12 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float]:
             gives = np.array(result["x"]).ravel()[-len(names) :]
             found = [i for i in np.argsort(-gives) if gives[i] > NOTABLE]
             return {names[i]: float(gives[i] * DEMANDS[names[i]][0]) for i in found}
-    return {}
+    return None
 
 
-def remedies(found: Mapping[str, float]) -> list[str]:
+def remedies(found: Mapping[str, float] | None) -> list[str]:
     """What to try, each remedy once."""
-    return list(dict.fromkeys(DEMANDS[name][1] for name in found))
+    return list(dict.fromkeys(DEMANDS[name][1] for name in found or ()))
 
 
 def _elastic(constraint: Constraint, room: ca.SX) -> list[Constraint]:

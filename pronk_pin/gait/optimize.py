@@ -148,7 +148,7 @@ def optimize_gait(
     violations = program.violations(found.state.x, p)
     worst = {name: violation.value for name, violation in violations.items()}
     if not found.success or max(worst.values()) > TOLERANCE:
-        gives = _fights(problem) if diagnose else {}
+        gives = _fights(problem) if diagnose else None
         raise GaitNotFound(problem.speed, found.status, worst, gives, remedies(gives))
     return _solution(problem, found.state, found)
 
@@ -214,7 +214,7 @@ def _check_alike(initial: GaitProblem, problem: GaitProblem) -> None:
         )
 
 
-def _fights(problem: GaitProblem) -> dict[str, float]:
+def _fights(problem: GaitProblem) -> dict[str, float] | None:
     """Which demands have to give way; a coarse mesh is enough to tell."""
     coarse = problem.remeshed([_COARSE] * len(problem.sequence))
     program = _program(coarse)

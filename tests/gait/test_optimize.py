@@ -131,6 +131,7 @@ def test_an_impossible_gait_names_what_fights(robot: Robot) -> None:
         optimize_gait(problem)
     assert max(caught.value.violations.values()) > TOLERANCE
     # The torque limits are 3.35 N m; a gait of this cost uses about 4 N m.
+    assert caught.value.fights is not None
     assert list(caught.value.fights) == ["torque limits"]
     assert "raise torque_use" in str(caught.value)
     enough = problem.torque_use * robot.tau_max[0] + caught.value.fights["torque limits"]
