@@ -16,16 +16,18 @@ from .compare import Experiment, Results, default_folder, run_experiment
 from .compare.tables import format_tables
 from .errors import InvalidInput, PronkError
 from .gait import (
-    SPEEDS,
     GaitLibrary,
     build_library,
     describe_gait,
     describe_library,
+    known_base,
     load_library,
+    number_range,
 )
 from .parity import compare_models
 from .robot import load_robot
 from .viz import Scene, gait_scene, serve, write_replay
+from .viz.gait_figures import write_gait_figures
 from .viz.practice import practice_scene
 from .viz.report import write_figures, write_report
 
@@ -120,24 +122,47 @@ class View:
 
 @dataclass(frozen=True)
 class Build:
-    """Optimise a gait library anew."""
+    """Optimise a gait library anew, from one gait outward.
+
+    Each gait is kept in a folder as soon as it is solved: run the same command again, and it
+    completes what is missing.
+    """
 
     robot: str = "a1"
     """Robot."""
-    speeds: tuple[float, ...] = SPEEDS
-    """Speeds [m/s]."""
-    apex: float = 0.34
-    """Greatest height of the trunk [m]."""
+    gait: str = "pronk"
+    """Which gait: pronk or bound."""
+    base: str | None = None
+    """How the trunk may move: locked (x and z only) or sagittal (pitching too); by default the
+    gait's own."""
+    speeds: tuple[str, ...] = ()
+    """Speeds [m/s], each a number or a range A:B:STEP; by default the gait's own."""
+    apex: tuple[str, ...] = ()
+    """Greatest heights of the trunk [m], each a number or a range A:B:STEP; by default the
+    gait's own."""
     output: Path = Path("gaits.npz")
     """File to write."""
+    folder: Path | None = None
+    """Where each gait is kept; by default beside the output, with '.build' to its name."""
+    workers: int | None = None
+    """Processes; by default one for each core."""
 
     def run(self) -> None:
         """Do it."""
+        folder = self.folder or self.output.with_name(self.output.name + ".build")
+        base = None if self.base is None else known_base(self.base)
         library = build_library(
-            load_robot(self.robot), sorted(self.speeds), apex=self.apex, path=self.output
+            load_robot(self.robot),
+            number_range("speeds", self.speeds) or None,
+            apexes=number_range("apex", self.apex) or None,
+            gait=self.gait,
+            base=base,
+            path=self.output,
+            folder=folder,
+            workers=self.workers,
         )
         print(describe_library(library))
-        print(f"\ngaits  {self.output}")
+        print(f"\ngaits   {self.output}\nfolder  {folder}  (each gait; no longer needed)")
 
 
 @dataclass(frozen=True)
@@ -146,25 +171,66 @@ class Show:
 
     speed: Positional[float | None] = None
     """One gait in detail [m/s]; by default a line for each."""
+    apex: float | None = None
+    """Its greatest height of the trunk [m]; by default the library's own."""
     library: Path | None = None
     """Library file; by default the shipped one."""
     robot: str = "a1"
     """Robot whose shipped library is shown."""
+    gait: str = "pronk"
+    """Which of its gaits: pronk or bound."""
+    base: str | None = None
+    """How the trunk may move in it; by default the gait's own."""
 
     def run(self) -> None:
         """Do it."""
-        library = _library(self.library, self.robot)
-        text = (
-            describe_library(library) if self.speed is None else describe_gait(library, self.speed)
+        library = _shown(self)
+        if self.speed is None:
+            print(describe_library(library))
+        else:
+            print(describe_gait(library, self.speed, self.apex))
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Draw a gait library: joints, torques, forces and trunk over the stride, and a side view."""
+
+    speed: Positional[float | None] = None
+    """Speed of the side view [m/s]; by default the one nearest to 0.5."""
+    apex: float | None = None
+    """Greatest height of the trunk [m]; by default the library's own."""
+    library: Path | None = None
+    """Library file; by default the shipped one."""
+    robot: str = "a1"
+    """Robot whose shipped library is drawn."""
+    gait: str = "pronk"
+    """Which of its gaits: pronk or bound."""
+    base: str | None = None
+    """How the trunk may move in it; by default the gait's own."""
+    folder: Path = Path("figures")
+    """Where to write the figures."""
+    format: str = "png"
+    """Format of the figures: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        library = _shown(self)
+        paths = write_gait_figures(
+            library, self.folder, speed=self.speed, apex=self.apex, suffix=self.format
         )
-        print(text)
+        for path in paths:
+            print(f"figure  {path}")
 
 
 @dataclass(frozen=True)
 class Gaits:
-    """Build or show the gait library."""
+    """Build, show or plot the gait library."""
 
-    action: Annotated[Build, subcommand("build")] | Annotated[Show, subcommand("show")]
+    action: (
+        Annotated[Build, subcommand("build")]
+        | Annotated[Show, subcommand("show")]
+        | Annotated[Plot, subcommand("plot")]
+    )
 
     def run(self) -> None:
         """Do it."""
@@ -257,6 +323,15 @@ def _library(path: Path | None, robot: str) -> GaitLibrary:
         load_robot(robot)
         return load_library(robot)
     return GaitLibrary.load(path)
+
+
+def _shown(command: Show | Plot) -> GaitLibrary:
+    """The library that a command looks at; one that failed its audit too."""
+    if command.library is not None:
+        return GaitLibrary.load(command.library, audited=False)
+    load_robot(command.robot)
+    base = None if command.base is None else known_base(command.base)
+    return load_library(command.robot, gait=command.gait, base=base)
 
 
 def _default_speed(speed: float | None) -> float:

@@ -59,6 +59,23 @@ class SpeedOutOfRange(PronkError):
         )
 
 
+class ApexOutOfRange(PronkError):
+    """An apex height that the gait library does not cover.
+
+    Attributes:
+        apex: The apex asked for [m].
+        lowest, highest: The range of the library [m].
+    """
+
+    def __init__(self, apex: float, lowest: float, highest: float) -> None:
+        self.apex, self.lowest, self.highest = apex, lowest, highest
+        super().__init__(
+            f"apex {apex:g} m is outside the gait library, which covers {lowest:g} to "
+            f"{highest:g} m; choose an apex in that range, or extend the library with "
+            "'pronk-pin gaits build --apex'"
+        )
+
+
 class FileProblem(PronkError):
     """A file or folder that is missing, damaged, or cannot be written.
 
@@ -103,24 +120,47 @@ class GaitNotFound(PronkError):
     Attributes:
         speed: The speed of the gait [m/s].
         status: What the solver said.
-        violations: Worst violation of each named constraint.
+        violations: Worst violation of each named constraint where the solver stopped.
+        fights: By how much which demands have to give way so that a gait exists, in their units;
+            empty where none has to, None where that was not asked for or has no answer.
     """
 
-    def __init__(self, speed: float, status: str, violations: dict[str, float]) -> None:
-        self.speed, self.status, self.violations = speed, status, dict(violations)
-        worst = sorted(violations.items(), key=lambda item: -item[1])[:3]
-        listed = ", ".join(f"{name} {value:.1e}" for name, value in worst)
-        super().__init__(
-            f"no gait found at {speed:g} m/s ({status}); worst violations: {listed}; relax those, "
-            "or start from a neighbouring speed's solution"
-        )
+    def __init__(
+        self,
+        speed: float,
+        status: str,
+        violations: dict[str, float],
+        fights: dict[str, float] | None = None,
+        remedies: Iterable[str] = (),
+    ) -> None:
+        self.speed, self.status = speed, status
+        self.violations = dict(violations)
+        self.fights = None if fights is None else dict(fights)
+        if self.fights:
+            gives = ", ".join(f"{name} by {value:.2g}" for name, value in self.fights.items())
+            advice = f"these demands fight, and must give way: {gives}; {'; '.join(remedies)}"
+        elif self.fights is not None:
+            advice = (
+                "its demands do not fight, a gait exists on a coarse mesh: start from the solution "
+                "of a neighbouring speed or apex"
+            )
+        else:
+            worst = sorted(violations.items(), key=lambda item: -item[1])[:3]
+            listed = ", ".join(f"{name} {value:.1e}" for name, value in worst)
+            advice = f"worst violations: {listed}; start from a neighbouring speed's solution"
+        super().__init__(f"no gait found at {speed:g} m/s ({status}); {advice}")
+
+    def with_note(self, note: str) -> GaitNotFound:
+        """The same error with something added to its message."""
+        self.args = (f"{self.args[0]}; {note}",)
+        return self
 
 
 class WorkerLost(PronkError):
-    """A process of a comparison ended in the middle of its work, for want of memory perhaps.
+    """A worker process ended in the middle of its work, for want of memory perhaps.
 
     Attributes:
-        folder: The results folder, which holds what was finished.
+        folder: The folder that holds what was finished.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -107,17 +107,29 @@ def test_view_writes_a_result_or_a_gait_to_a_file(result: Path, tmp_path: Path) 
 
 def test_gaits_show_proves_every_gait(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["gaits", "show"]) == 0
-    rows = re.findall(r"^ +[+-]\d\.\d\d ", capsys.readouterr().out, flags=re.MULTILINE)
+    output = capsys.readouterr().out
+    rows = re.findall(r"^ +[+-]\d\.\d\d +0\.340 ", output, flags=re.MULTILINE)
     assert len(rows) == 14
+    assert "FAILED" not in output
     assert main(["gaits", "show", "-0.3"]) == 0
     assert "friction cone" in capsys.readouterr().out
+    assert main(["gaits", "show", "0.3", "--gait", "bound"]) == 0
+    assert "rear stance: 0.100 s on RL, RR" in capsys.readouterr().out
+    assert main(["gaits", "show", "0.35", "--apex", "0.335"]) == 0
+    assert "the equations of motion lack" in capsys.readouterr().out
 
 
 def test_gaits_build_makes_a_library_that_show_reads(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "two.npz"
-    assert main(["gaits", "build", "--speeds", "0.1", "0.2", "--output", str(path)]) == 0
+    build = ["gaits", "build", "--speeds", "0.1:0.2:0.1", "--output", str(path), "--workers", "2"]
+    assert main(build) == 0
+    files = sorted((tmp_path / "two.npz.build").iterdir())
+    before = [file.stat().st_mtime_ns for file in files]
+    assert len(files) == 2
+    assert main(build) == 0
+    assert [file.stat().st_mtime_ns for file in files] == before
     assert main(["gaits", "show", "0.2", "--library", str(path)]) == 0
     assert "18-DoF residual" in capsys.readouterr().out
 
@@ -155,6 +167,14 @@ def test_parity_exits_with_1_where_a_model_differs(
     assert main(["parity", str(load_robot("a1").urdf_path)]) == 0
 
 
+def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["gaits", "plot", "0.45", "--format", "svg", "--folder", str(tmp_path)]) == 0
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"a1-pronk-stride.svg", "a1-pronk-side.svg"}
+    assert "A1 at 0.45 m/s" in (tmp_path / "a1-pronk-side.svg").read_text()
+    assert str(tmp_path / "a1-pronk-side.svg") in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -177,6 +197,14 @@ def test_parity_exits_with_1_where_a_model_differs(
         (["parity", "--states", "0"], "states=0; at least one is needed"),
         (["parity", "--seed", "-1"], "seed=-1; give a number from 0 on"),
         (["parity", "--tolerance", "-1"], "tolerance=-1.0; give a number from 0 on"),
+        (["gaits", "build", "--speeds", "fast"], "speeds 'fast' is neither a number nor a range"),
+        (["gaits", "build", "--gait", "trot"], "unknown gait 'trot'; choose one of: pronk, bound"),
+        (["gaits", "build", "--base", "free"], "unknown base 'free'; choose one of: locked"),
+        (["gaits", "build", "--workers", "0"], "at least one is needed"),
+        (["gaits", "show", "0.1", "--apex", "0.5"], "which covers 0.32 to 0.36 m"),
+        (["gaits", "show", "--robot", "solo12"], "no such gait library"),
+        (["gaits", "plot", "--format", "bmp"], "choose png, svg, pdf"),
+        (["gaits", "plot", "--apex", "0.5"], "no apex 0.5; choose one of: 0.32, 0.34, 0.36"),
     ],
 )
 def test_bad_input_gets_one_line_with_the_remedy(

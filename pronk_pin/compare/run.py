@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
-import threading
 import time
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import connection
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
+from .._workers import follow_parent
 from ..errors import InvalidInput, WorkerLost
 from .experiment import Cell, Experiment, run_cell
 from .results import Results
@@ -108,15 +106,7 @@ def _begin_worker(counter: Synchronized[int]) -> None:
     """Set a worker up: it counts its steps, leaves Ctrl-C to the parent, and dies with it."""
     global _steps_done
     _steps_done = counter
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def follow() -> None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
+    follow_parent()
 
 
 def _work(results: Results, cell: Cell) -> None:

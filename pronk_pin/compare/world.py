@@ -167,6 +167,7 @@ class World:
         self._qvel = np.array([model.joint(name).dofadr[0] for name in robot.joint_names])
         self._ctrl = np.array([model.actuator(name).id for name in robot.joint_names])
         self._base = np.array([model.joint(name).qposadr[0] for name in ("x", "z")])
+        self._base_rate = np.array([model.joint(name).dofadr[0] for name in ("x", "z")])
         address = [model.sensor(name).adr[0] for name in robot.foot_names]
         self._force = np.array(address)[:, None] + np.arange(3)
         self._state = np.zeros((n, 1, mujoco.mj_stateSize(model, _FULL)))
@@ -175,12 +176,27 @@ class World:
         self._warmstart = np.zeros((n, model.nv))
         self.reset(np.zeros((n, 2)), np.tile(robot.standing[7:], (n, 1)))
 
-    def reset(self, base: Array, joints: Array) -> None:
-        """Put every robot at rest at a trunk position x, z (n, 2) and joint angles (n, 12)."""
-        state = self._state[:, 0]
+    def reset(
+        self,
+        base: Array,
+        joints: Array,
+        base_rate: Array | float = 0.0,
+        joint_rates: Array | float = 0.0,
+    ) -> None:
+        """Put every robot somewhere, by default at rest.
+
+        Args:
+            base: Trunk x and z [m], shape (n, 2).
+            joints: Joint angles [rad], shape (n, 12).
+            base_rate: Rates of the trunk's x and z [m/s], shape (n, 2).
+            joint_rates: Joint velocities [rad/s], shape (n, 12).
+        """
+        state, nq = self._state[:, 0], self.model.nq
         state[:] = 0.0
         state[:, 1 + self._base] = base
         state[:, 1 + self._qpos] = joints
+        state[:, 1 + nq + self._base_rate] = base_rate
+        state[:, 1 + nq + self._qvel] = joint_rates
         self._warmstart[:] = 0.0
         self._sensors[:] = 0.0
         self._read()
@@ -207,7 +223,7 @@ class World:
     def _read(self) -> None:
         position = self._state[:, 0, 1 : 1 + self.model.nq]
         rate = self._state[:, 0, 1 + self.model.nq :]
-        self.base, self.base_rate = position[:, self._base], rate[:, self._base]
+        self.base, self.base_rate = position[:, self._base], rate[:, self._base_rate]
         self.joints, self.joint_rates = position[:, self._qpos], rate[:, self._qvel]
         self.force = -self._sensors[:, 0][:, self._force]  # the sensor has the floor's side of it
 

@@ -1,26 +1,46 @@
 """What the robot should do: optimal gaits, their Bezier form, and the library."""
 
-from .audit import Audit, Check, audit
-from .build import SPEEDS, build_library, describe_gait, describe_library
+from .audit import BezierLoss, audit, bezier_orders
+from .build import build_library
+from .checks import Audit, Check
+from .describe import describe_gait, describe_library
 from .gait import Gait, GaitPhase, Motion
+from .guess import vertical_hop
 from .library import GaitLibrary, load_library
-from .optimize import GaitSolution, optimize_gait
-from .problem import GaitProblem
+from .optimize import GaitSolution, SolverState, optimize_gait
+from .problem import BOUND, PRONK, ContactPhase, GaitProblem
+from .residual import GaitResidual, gait_residual
+from .style import SPEEDS, STYLES, Style, gait_problem, known_base, load_style, number_range
 
 __all__ = [
+    "BOUND",
+    "PRONK",
     "SPEEDS",
+    "STYLES",
     "Audit",
+    "BezierLoss",
     "Check",
+    "ContactPhase",
     "Gait",
     "GaitLibrary",
     "GaitPhase",
     "GaitProblem",
+    "GaitResidual",
     "GaitSolution",
     "Motion",
+    "SolverState",
+    "Style",
     "audit",
+    "bezier_orders",
     "build_library",
     "describe_gait",
     "describe_library",
+    "gait_problem",
+    "gait_residual",
+    "known_base",
     "load_library",
+    "load_style",
+    "number_range",
     "optimize_gait",
+    "vertical_hop",
 ]

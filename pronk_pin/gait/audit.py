@@ -1,152 +1,106 @@
 """Is a gait right? Each claim about a solution, checked by other means than the solver's.
 
 The named constraints are evaluated on the collocation's own expressions. Everything else is seen
-with Pinocchio's model of the whole robot, which the optimisation never touched.
+with Pinocchio's model of the whole robot, which the optimisation never touched, and by solving once
+more on a coarser mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from .._typing import Array
 from ..dynamics import contact_jacobian
+from ..errors import GaitNotFound
 from ..kinematics import foot_positions
 from ..robot import NB, Robot
 from . import bezier
-from .collocation import UNITS
+from .checks import Audit, Check
 from .gait import Motion
-from .optimize import TOLERANCE, GaitSolution
+from .optimize import GaitSolution, fit_phase, optimize_gait, resampled
+from .problem import ContactPhase
 from .reintegration import drift, guided_rows
+from .residual import missing_forces
 
-CHECKS: Mapping[str, tuple[str, float | None]] = {
-    "18-DoF residual": ("N or N m", 1e-8),
-    "mirror symmetry": ("m", 1e-12),
-    "apex error": ("m", 1e-4),
-    "contact height drift": ("m", 2e-6),
-    "contact slip": ("m/s", 1e-4),
-    "stance drift": ("rad", 2e-5),
-    "stance foot drift": ("m", 2e-6),
-    "flight drift": ("rad", 1e-3),
-    "flight foot drift": ("m", 1e-4),
-    "bezier position": ("rad", 1e-3),
-    "bezier velocity": ("rad/s", None),
-    "bezier torque": ("N m", None),
-    "torque use": ("of limit", 1.0),
-    "velocity use": ("of limit", 1.0),
-    "friction use": ("of limit", 1.0),
-    "ground force": ("N", None),
-}
-"""Unit of each independent check, and the largest value that passes (None: it only informs)."""
+ORDERS = range(4, 17)
+"""Bezier orders that `bezier_orders` tries."""
 
-_VIOLATION = "violation: "
+_NO_LOAD = 1e-3
+"""Force below which a foot counts as unloaded [N]; it uses nothing of its friction cone."""
 
 
-@dataclass(frozen=True)
-class Check:
-    """One checked claim.
+def audit(solution: GaitSolution, *, refine: bool = True) -> Audit:
+    """Check a solution; takes a second or two.
 
-    Attributes:
-        name: What was checked.
-        value: The worst value found.
-        unit: Its unit.
-        where: Where it was found.
-        limit: What passes; None where the value only informs.
+    Args:
+        solution: The solution.
+        refine: Find the order of convergence too, by solving on a mesh half as fine.
     """
-
-    name: str
-    value: float
-    unit: str
-    where: str = ""
-    limit: float | None = None
-
-    @property
-    def passed(self) -> bool:
-        """Whether the value is within its limit."""
-        return self.limit is None or self.value <= self.limit
-
-
-@dataclass(frozen=True)
-class Audit:
-    """What was found about one gait.
-
-    Attributes:
-        speed: Speed of the gait [m/s].
-        constraints: The named constraints of the problem with their worst violations.
-        checks: The independent checks.
-    """
-
-    speed: float
-    constraints: tuple[Check, ...]
-    checks: tuple[Check, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether everything is within its limit."""
-        return not self.failures
-
-    @property
-    def worst_violation(self) -> Check:
-        """The constraint that is violated most."""
-        return max(self.constraints, key=lambda check: check.value)
-
-    @property
-    def failures(self) -> tuple[Check, ...]:
-        """What is not within its limit."""
-        return tuple(check for check in (*self.constraints, *self.checks) if not check.passed)
-
-    def flat(self) -> dict[str, float]:
-        """Values by name, as a gait library keeps them; constraints as "violation: name"."""
-        entries = {_VIOLATION + check.name: check.value for check in self.constraints}
-        return entries | {check.name: check.value for check in self.checks}
-
-    @classmethod
-    def from_flat(cls, speed: float, entries: Mapping[str, float]) -> Audit:
-        """The audit that a gait library keeps; where a value was found is lost."""
-        names = [name.removeprefix(_VIOLATION) for name in entries if name.startswith(_VIOLATION)]
-        constraints = (_constraint(name, entries[_VIOLATION + name]) for name in names)
-        checks = (_check(name, entries[name]) for name in CHECKS if name in entries)
-        return cls(speed, tuple(constraints), tuple(checks))
-
-    def table(self) -> str:
-        """Everything that was found, one line a check."""
-        lines = [f"{'check':<24}{'worst':>10}  {'unit':<12}{'limit':>8}  where"]
-        for check in (*self.constraints, *self.checks):
-            limit = "" if check.limit is None else f"{check.limit:.0e}"
-            note = check.where if check.passed else f"{check.where}  FAILED"
-            lines.append(
-                f"{check.name:<24}{check.value:>10.1e}  {check.unit:<12}{limit:>8}  {note}".rstrip()
-            )
-        return "\n".join(lines)
-
-
-def audit(solution: GaitSolution) -> Audit:
-    """Check a solution; takes about a second."""
     constraints = tuple(
-        _constraint(name, worst.value, worst.where) for name, worst in solution.violations.items()
+        Check.of_constraint(name, worst.value, worst.where)
+        for name, worst in solution.violations.items()
     )
+    stance, flight = _drifts(solution)
     checks = (
-        _residual(solution),
+        *_residual(solution),
         _symmetry(solution),
         _apex(solution),
         *_contact_drift(solution),
-        *_reintegration(solution),
+        Check.of("stance drift", stance.joints, stance.joints_where),
+        Check.of("stance foot drift", stance.feet, stance.feet_where),
+        Check.of("flight drift", flight.joints, flight.joints_where),
+        Check.of("flight foot drift", flight.feet, flight.feet_where),
+        *([_order(solution, stance.joints)] if refine else []),
         *_bezier(solution),
         *_use(solution),
     )
     return Audit(solution.problem.speed, constraints, checks)
 
 
-def _constraint(name: str, value: float, where: str = "") -> Check:
-    return Check(name, value, UNITS[name], where, TOLERANCE)
+class BezierLoss(NamedTuple):
+    """What Bezier polynomials of one order lose against the optimised motion of a phase."""
+
+    order: int
+    joints: float
+    """Largest error of a joint [rad]."""
+    feet: float
+    """Largest error of a foot's height [m]."""
 
 
-def _check(name: str, value: float, where: str = "") -> Check:
-    unit, limit = CHECKS[name]
-    return Check(name, value, unit, where, limit)
+def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
+    """Why a phase has its Bezier order: what each order loses, by phase.
+
+    The errors are those at the nodes of the mesh, midpoints included.
+    """
+    robot, found = solution.problem.robot, {}
+    for phase, motion in _phases(solution):
+        losses, feet = [], _feet(robot, motion)
+        s = motion.t / motion.t[-1]
+        for order in ORDERS:
+            fitted = fit_phase(solution, dataclasses.replace(phase, order=order))
+            q = fitted.motion(robot, s).q
+            joints = float(np.max(np.abs(q - motion.q)[:, NB + 1 :]))
+            height = foot_positions(robot, q)[..., 2] - feet[..., 2]
+            losses.append(BezierLoss(order, joints, float(np.max(np.abs(height)))))
+        found[phase.name] = tuple(losses)
+    return found
+
+
+def _phases(solution: GaitSolution) -> Iterator[tuple[ContactPhase, Motion]]:
+    for phase in solution.problem.sequence:
+        yield phase, solution.motions[phase.name]
+
+
+def _stances(solution: GaitSolution) -> Iterator[tuple[str, Motion, list[int]]]:
+    """Name, motion and standing legs (by index) of the phases with feet on the ground."""
+    legs = solution.problem.robot.legs
+    for phase, motion in _phases(solution):
+        if phase.stands:
+            yield phase.name, motion, [legs.index(leg) for leg in solution.problem.feet(phase)]
 
 
 def _worst(name: str, by_phase: Mapping[str, tuple[Motion, Array]]) -> Check:
@@ -155,26 +109,25 @@ def _worst(name: str, by_phase: Mapping[str, tuple[Motion, Array]]) -> Check:
     for phase, (motion, values) in by_phase.items():
         by_node = np.abs(values).reshape(len(motion.t), -1).max(axis=1)
         k = int(np.argmax(by_node))
-        found.append((float(by_node[k]), f"{phase}, t = {motion.t[k]:.3f} s"))
+        found.append((float(by_node[k]), _place(phase, motion.t[k])))
     value, where = max(found)
-    return _check(name, value, where)
+    return Check.of(name, value, where)
 
 
-def _residual(solution: GaitSolution) -> Check:
-    """Equations of motion (2) of the whole robot in the rows that the guide leaves free."""
+def _place(phase: str, time: float) -> str:
+    return f"{phase}, t = {time:.3f} s"
+
+
+def _residual(solution: GaitSolution) -> tuple[Check, Check]:
+    """Equations of motion (2) of the whole robot: in the rows that the guide leaves free nothing
+    must be missing; in the others, what the guide carries."""
     robot, contact = solution.problem.robot, solution.problem.contact
-    rows, by_phase = guided_rows(robot), {}
+    rows, free, guide = guided_rows(robot, solution.problem.base), {}, {}
     for name, motion in solution.motions.items():
-        residuals = []
-        for q, v, a, tau, lam in zip(
-            motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True
-        ):
-            force = pin.rnea(robot.model, robot.data, q, v, a).copy()
-            force -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
-            force[NB:] -= tau
-            residuals.append(force[rows])
-        by_phase[name] = (motion, np.array(residuals))
-    return _worst("18-DoF residual", by_phase)
+        missing = missing_forces(robot, motion, contact)
+        free[name] = (motion, missing[:, rows])
+        guide[name] = (motion, np.delete(missing, rows, axis=1))
+    return _worst("18-DoF residual", free), _worst("guide", guide)
 
 
 def _symmetry(solution: GaitSolution) -> Check:
@@ -191,37 +144,85 @@ def _symmetry(solution: GaitSolution) -> Check:
 
 
 def _apex(solution: GaitSolution) -> Check:
-    """The trunk's greatest height between the nodes, too."""
-    base, _ = solution.gait.flight.base_reference(np.linspace(0.0, 1.0, 1001))
-    error = abs(float(np.max(base[:, 1])) - solution.problem.apex)
-    return _check("apex error", error, "flight")
+    """The trunk's greatest height in flight, between the nodes too, or, with several flights, its
+    height in the middle of each."""
+    flights, errors = [phase for phase in solution.gait.phases if not phase.feet], []
+    for phase in flights:
+        height = phase.base_reference(np.linspace(0.0, 1.0, 1001))[0][:, 1]
+        top = float(np.max(height) if len(flights) == 1 else height[len(height) // 2])
+        errors.append((abs(top - solution.problem.apex), phase.name))
+    return Check.of("apex error", *max(errors))
 
 
 def _contact_drift(solution: GaitSolution) -> tuple[Check, Check]:
     """Height and slip of the standing feet, which are imposed at touchdown only."""
-    robot, motion = solution.problem.robot, solution.motions["stance"]
-    height = _feet(robot, motion)[..., 2] - robot.foot_radius
-    slip = [
-        contact_jacobian(robot, q, contact=solution.problem.contact) @ v
-        for q, v in zip(motion.q, motion.v, strict=True)
-    ]
-    return (
-        _worst("contact height drift", {"stance": (motion, height)}),
-        _worst("contact slip", {"stance": (motion, np.array(slip))}),
-    )
-
-
-def _reintegration(solution: GaitSolution) -> tuple[Check, ...]:
-    """Stance and flight under the optimised torques, by an adaptive integrator."""
     robot, contact = solution.problem.robot, solution.problem.contact
-    stance = drift(robot, solution.motions["stance"], contact=contact)
-    flight = drift(robot, solution.motions["flight"], contact=None)
-    return (
-        _check("stance drift", stance.joints, "stance"),
-        _check("stance foot drift", stance.feet, "stance"),
-        _check("flight drift", flight.joints, "flight"),
-        _check("flight foot drift", flight.feet, "flight"),
-    )
+    height, slip = {}, {}
+    for name, motion, legs in _stances(solution):
+        height[name] = (motion, _feet(robot, motion)[:, legs, 2] - robot.foot_radius)
+        feet = [robot.legs[leg] for leg in legs]
+        velocity = [
+            contact_jacobian(robot, q, feet=feet, contact=contact) @ v
+            for q, v in zip(motion.q, motion.v, strict=True)
+        ]
+        slip[name] = (motion, np.array(velocity))
+    return _worst("contact height drift", height), _worst("contact slip", slip)
+
+
+class _PhaseDrift(NamedTuple):
+    """The worst drifts of some phases, and where."""
+
+    joints: float
+    joints_where: str
+    feet: float
+    feet_where: str
+
+
+def _drifts(solution: GaitSolution) -> tuple[_PhaseDrift, _PhaseDrift]:
+    """Stance and flight under the optimised torques, by an adaptive integrator."""
+    problem = solution.problem
+    drifts = {
+        phase: drift(
+            problem.robot,
+            motion,
+            contact=problem.contact,
+            feet=problem.feet(phase),
+            base=problem.base,
+        )
+        for phase, motion in _phases(solution)
+    }
+
+    def worst(standing: bool) -> _PhaseDrift:
+        mine = {phase.name: d for phase, d in drifts.items() if bool(phase.stands) == standing}
+        joints = max((d.joints.value, _place(name, d.joints.time)) for name, d in mine.items())
+        feet = max((d.feet.value, _place(name, d.feet.time)) for name, d in mine.items())
+        return _PhaseDrift(*joints, *feet)
+
+    return worst(True), worst(False)
+
+
+def _order(solution: GaitSolution, fine: float) -> Check:
+    """Order of convergence: how the drift of the stances falls as the mesh gets finer.
+
+    The coarser mesh has half the intervals, or two thirds where the solver finds no gait on half.
+    """
+    name, intervals = "convergence order", solution.problem.intervals
+    for share in (1 / 2, 2 / 3):
+        coarse = tuple(max(4, 2 * round(n * share / 2)) for n in intervals)
+        ratio = sum(intervals) / sum(coarse)
+        if ratio == 1.0:
+            break
+        try:
+            found = optimize_gait(
+                solution.problem.remeshed(coarse),
+                initial=resampled(solution, coarse),
+                diagnose=False,
+            )
+        except GaitNotFound:
+            continue
+        order = float(np.log(_drifts(found)[0].joints / fine) / np.log(ratio))
+        return Check.of(name, order, f"stance drift, from {coarse} intervals to {intervals}")
+    return Check.of(name, 0.0, "no gait on a coarser mesh to compare with")
 
 
 def _bezier(solution: GaitSolution) -> tuple[Check, ...]:
@@ -242,24 +243,26 @@ def _bezier(solution: GaitSolution) -> tuple[Check, ...]:
 
 
 def _use(solution: GaitSolution) -> tuple[Check, ...]:
-    """How much of each limit the gait uses, and the forces and torques themselves."""
+    """How much of each limit the gait uses, and the force of the ground."""
     robot, motions = solution.problem.robot, solution.motions
-    stance = motions["stance"]
-    tangential = np.linalg.norm(stance.lam[..., :2], axis=-1)
-    # A foot without load uses nothing.
-    normal = np.maximum(stance.lam[..., 2], np.finfo(float).tiny)
-    cone = tangential / (solution.problem.friction * normal)
+    cone, total = {}, {}
+    for name, motion, legs in _stances(solution):
+        lam = motion.lam[:, legs]
+        tangential = np.linalg.norm(lam[..., :2], axis=-1)
+        # A foot without load uses nothing.
+        normal = np.maximum(lam[..., 2], _NO_LOAD)
+        cone[name] = (motion, tangential / (solution.problem.friction * normal))
+        total[name] = (motion, lam[..., 2].sum(axis=1))
     torque = {name: (m, m.tau / robot.tau_max) for name, m in motions.items()}
     velocity = {name: (m, m.v[:, NB:] / robot.v_max) for name, m in motions.items()}
-    total = stance.lam[..., 2].sum(axis=1)
     return (
         _worst("torque use", torque),
         _worst("velocity use", velocity),
-        _worst("friction use", {"stance": (stance, cone)}),
-        _worst("ground force", {"stance": (stance, total)}),
+        _worst("friction use", cone),
+        _worst("ground force", total),
     )
 
 
 def _feet(robot: Robot, motion: Motion) -> Array:
     """Centres of the feet at the nodes [m], shape (nodes, 4, 3)."""
-    return np.array([foot_positions(robot, q) for q in motion.q])
+    return foot_positions(robot, motion.q)

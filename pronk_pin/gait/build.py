@@ -1,11 +1,24 @@
-"""From speeds to a gait library: continuation outward from the slowest gait."""
+"""From speeds and apex heights to a gait library: continuation outward from one gait.
+
+Each gait is a file of its own as soon as it is solved and audited, so that a build which was
+interrupted goes on where it was. A gait starts from the solution of its neighbour on the way to the
+slowest gait at the home apex; where there is none, or that fails, from a crude guess.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
+import multiprocessing
+import os
+import sys
+import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,145 +26,329 @@ import numpy as np
 from tqdm import tqdm
 
 from .._typing import Array
-from ..errors import GaitNotFound, InvalidInput
-from ..robot import Robot
-from .audit import Audit, audit
-from .library import GaitLibrary
-from .optimize import GaitSolution, optimize_gait
-from .problem import GaitProblem
-
-SPEEDS: tuple[float, ...] = tuple(np.round(np.arange(-5, 9) * 0.1, 1).tolist())
-"""The paper's 14 speeds, -0.5 to 0.8 m/s."""
+from .._workers import follow_parent
+from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
+from ..robot import Robot, RobotSpec, load_robot
+from .audit import audit, bezier_orders
+from .library import DAMAGE, SCHEMA, GaitLibrary, from_arrays, to_arrays, write_arrays
+from .optimize import GaitSolution, SolverState, optimize_gait
+from .problem import Base, GaitProblem
+from .style import gait_problem, load_style
 
 _PACKAGES = ("casadi", "pin", "numpy", "scipy", "example-robot-data")
+
+_AGAIN = "delete it and run the same command again"
+
+Key = tuple[float, float]
+"""Speed and apex of a gait."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """What the file of one gait holds: a library of one, and what a warm start needs."""
+
+    library: GaitLibrary
+    state: SolverState
 
 
 def build_library(
     robot: Robot,
-    speeds: Sequence[float] | Array = SPEEDS,
+    speeds: Sequence[float] | Array | None = None,
     *,
-    apex: float = 0.34,
+    apexes: Sequence[float] | Array | None = None,
+    gait: str = "pronk",
+    base: Base | None = None,
     path: Path | str | None = None,
+    folder: Path | str | None = None,
+    workers: int | None = 1,
     progress: bool = True,
+    **changes: Any,
 ) -> GaitLibrary:
-    """Optimise and audit a gait for each speed.
+    """Optimise and audit a gait for each speed at each apex.
 
     Args:
         robot: The robot.
-        speeds: Speeds [m/s], in any order.
-        apex: Greatest height of the trunk [m].
+        speeds: Speeds [m/s], in any order; by default those of the gait's style.
+        apexes: Greatest heights of the trunk [m], in any order; by default the style's.
+        gait: Name of the style: "pronk" or "bound".
+        base: How the trunk may move; None for the style's own.
         path: Where to save the library; None does not save it.
+        folder: Where each gait is kept as soon as it is solved, and taken from if it is there;
+            None keeps nothing but the library.
+        workers: Processes; None for one for each core. A script that asks for more than one must
+            guard its own main code with `if __name__ == "__main__"`.
         progress: Whether to show a progress bar.
+        changes: Other attributes of `GaitProblem`.
 
     Raises:
-        InvalidInput: There are no speeds.
-        GaitNotFound: A speed has no gait, from its neighbour or from the crude guess.
-        FileProblem: The library cannot be written.
+        InvalidInput: There are no speeds or heights, or no workers.
+        UnknownName: There is no such gait.
+        GaitNotFound: A gait was not found, from its neighbour or from the crude guess. Those that
+            were found are in the folder.
+        FileProblem: A file of the folder is damaged or of another problem, or one cannot be
+            written.
     """
-    if not len(speeds):
-        raise InvalidInput("no speeds to build gaits for; give at least one")
     began = time.perf_counter()
-    solved: dict[float, GaitSolution] = {}
-    audits: dict[float, Audit] = {}
-    for speed in tqdm(_outward(speeds), desc="gaits", unit="gait", disable=not progress):
-        solved[speed] = _solve(GaitProblem(robot, speed, apex), solved)
-        audits[speed] = audit(solved[speed])
-    solutions = [solved[speed] for speed in sorted(solved)]
-    library = GaitLibrary(
-        gaits=tuple(solution.gait for solution in solutions),
-        metadata=_metadata(robot, solutions, time.perf_counter() - began),
-        audit=tuple(audits[speed].flat() for speed in sorted(audits)),
-    )
+    style = load_style(gait)
+    speeds = style.speeds if speeds is None else speeds
+    apexes = (style.apex,) if apexes is None else apexes
+    if not len(speeds) or not len(apexes):
+        raise InvalidInput("no speeds or no heights to build gaits for; give at least one of each")
+    workers = workers if workers is not None else os.cpu_count() or 1
+    if workers < 1:
+        raise InvalidInput(f"{workers} workers; at least one is needed")
+    parents = _outward(speeds, apexes, style.apex)
+    with _folder(folder) as place:
+        tasks = {
+            key: _Task(
+                gait_problem(robot, key[0], gait=gait, base=base, **{**changes, "apex": key[1]}),
+                place / f"speed{key[0]:+.3f}_apex{key[1]:.4f}.npz",
+            )
+            for key in parents
+        }
+        _solve_all(tasks, parents, workers, progress, keeps=folder is not None)
+        solved = {key: _read(task) for key, task in tasks.items()}
+    library = _library(robot, gait, solved, tasks, _home(apexes, style.apex))
+    library.metadata["build_time"] = round(time.perf_counter() - began, 2)  # type: ignore[index]
     if path is not None:
         library.save(path)
     return library
 
 
-def describe_library(library: GaitLibrary) -> str:
-    """A table of the gaits and of what their audit found.
+@dataclass(frozen=True)
+class _Task:
+    """A gait to be solved, and the file it goes to."""
 
-    Raises:
-        InvalidInput: The library has no audit.
-    """
-    if len(library.audit) != len(library.gaits):
-        raise InvalidInput("this gait library has no audit; build it with 'pronk-pin gaits build'")
-    header = (
-        "  speed  stance  flight  violation  18-DoF res.  stance drift      foot  flight drift"
-        "    Bezier  torque  friction"
+    problem: GaitProblem
+    path: Path
+
+
+@contextmanager
+def _folder(folder: Path | str | None) -> Iterator[Path]:
+    if folder is not None:
+        yield Path(folder)
+        return
+    with tempfile.TemporaryDirectory(prefix="pronk-pin-gaits-") as temporary:
+        yield Path(temporary)
+
+
+def _home(apexes: Sequence[float] | Array, wanted: float) -> float:
+    """The apex that a build begins at."""
+    return float(min(apexes, key=lambda apex: (abs(apex - wanted), apex)))
+
+
+def _outward(
+    speeds: Sequence[float] | Array, apexes: Sequence[float] | Array, wanted: float
+) -> dict[Key, Key | None]:
+    """Each gait once, with the neighbour that it starts from: along the speeds at the home apex,
+    then along the heights. Neighbours come before those that start from them."""
+    rows = sorted({float(speed) + 0.0 for speed in speeds}, key=lambda v: (abs(v), v))
+    home = _home(apexes, wanted)
+    columns = sorted({float(apex) for apex in apexes}, key=lambda h: (abs(h - home), h))
+    parents: dict[Key, Key | None] = {}
+    for apex in columns:
+        for speed in rows:
+            if apex == home:
+                nearer = [(v, h) for v, h in parents if h == home]
+                parent = min(nearer, key=lambda key: abs(key[0] - speed), default=None)
+            else:
+                heights = [h for v, h in parents if v == speed]
+                parent = (speed, min(heights, key=lambda h: abs(h - apex)))
+            parents[speed, apex] = parent
+    return parents
+
+
+def _solve_all(
+    tasks: Mapping[Key, _Task],
+    parents: Mapping[Key, Key | None],
+    workers: int,
+    progress: bool,
+    *,
+    keeps: bool,
+) -> None:
+    """Solve what has no file yet; what is there is checked first, so that damage is named early."""
+    done = {key for key, task in tasks.items() if task.path.exists()}
+    for key in done:
+        _read(tasks[key])
+    waiting = [key for key in parents if key not in done]
+    robot = next(iter(tasks.values())).problem.robot
+    # Processes load the robot by its names; one that was changed afterwards stays in this one.
+    if robot is not load_robot(robot.spec):
+        workers = 1
+    failed: dict[Key, GaitNotFound] = {}
+    bar = tqdm(
+        total=len(tasks),
+        initial=len(done),
+        desc="gaits",
+        unit="gait",
+        mininterval=0.5 if sys.stderr.isatty() else 10.0,
+        disable=not progress or not waiting,
     )
-    units = (
-        "    m/s       s       s     (worst)       N, N m           rad         m           rad"
-        "       rad  of lim.   of lim."
-    )
-    lines = [header, units]
-    for gait, entries in zip(library.gaits, library.audit, strict=True):
-        found = Audit.from_flat(gait.speed, entries)
-        lines.append(
-            f"{gait.speed:>+7.2f}{gait.stance.duration:>8.3f}{gait.flight.duration:>8.3f}"
-            f"{found.worst_violation.value:>11.1e}{entries['18-DoF residual']:>13.1e}"
-            f"{entries['stance drift']:>14.1e}{entries['stance foot drift']:>10.1e}"
-            f"{entries['flight drift']:>14.1e}{entries['bezier position']:>10.1e}"
-            f"{entries['torque use']:>9.0%}{entries['friction use']:>10.0%}"
-            + ("" if found.passed else "  FAILED: " + ", ".join(c.name for c in found.failures))
-        )
-    return "\n".join(lines)
+    with bar:
+        if workers == 1 or len(waiting) <= 1:
+            for key in waiting:
+                try:
+                    _work(tasks[key], _start(key, parents, tasks))
+                except GaitNotFound as error:
+                    failed[key] = error
+                bar.update()
+        else:
+            try:
+                _in_processes(
+                    waiting, done, parents, tasks, min(workers, len(waiting)), bar, failed
+                )
+            except BrokenProcessPool as error:
+                place = next(iter(tasks.values())).path.parent
+                raise WorkerLost(place) from error
+    if failed:
+        (speed, apex), first = next(iter(failed.items()))
+        others = ", ".join(f"{v:g} m/s at {h:g} m" for v, h in list(failed)[1:])
+        note = f"apex {apex:g} m" + (f"; nor at {others}" if others else "")
+        if keeps and len(failed) < len(tasks):
+            place = tasks[speed, apex].path.parent
+            note += f"; the other {len(tasks) - len(failed)} gaits are in {place}"
+        raise first.with_note(note)
 
 
-def describe_gait(library: GaitLibrary, speed: float) -> str:
-    """One gait in detail: its form, and its audit where the speed is one of the library's.
-
-    Raises:
-        SpeedOutOfRange: The library does not cover the speed.
-    """
-    gait = library.at(speed)
-    lines = [
-        f"{gait.robot} pronking at {gait.speed:+.3g} m/s, apex {gait.apex:.3g} m, "
-        f"{1.0 / gait.duration:.2f} strides/s"
-    ]
-    for phase in gait.phases:
-        feet = ", ".join(phase.feet) or "no feet"
-        order = phase.joints.shape[-1] - 1
-        lines.append(f"  {phase.name}: {phase.duration:.3f} s on {feet}; Bezier order {order}")
-    k = int(np.argmin(np.abs(library.speeds - speed)))
-    if library.gaits[k] is gait and library.audit:
-        lines += ["", Audit.from_flat(gait.speed, library.audit[k]).table()]
-    elif library.gaits[k] is not gait:
-        lines.append("  interpolated between its neighbours (eq. 13); the audit is theirs")
-    return "\n".join(lines)
+def _start(key: Key, parents: Mapping[Key, Key | None], tasks: Mapping[Key, _Task]) -> Path | None:
+    """The file of the neighbour to start from, if that was solved."""
+    parent = parents[key]
+    return tasks[parent].path if parent is not None and tasks[parent].path.exists() else None
 
 
-def _outward(speeds: Sequence[float] | Array) -> list[float]:
-    """Each speed once, the slowest first, so that every other one has a solved neighbour."""
-    unique = {float(speed) + 0.0 for speed in speeds}  # -0.0 is 0.0
-    return sorted(unique, key=lambda speed: (abs(speed), speed))
-
-
-def _solve(problem: GaitProblem, solved: Mapping[float, GaitSolution]) -> GaitSolution:
-    """Start from the closest solved speed; where that fails, from the crude guess."""
-    if solved:
-        neighbour = min(solved, key=lambda speed: abs(speed - problem.speed))
+def _in_processes(
+    waiting: list[Key],
+    done: set[Key],
+    parents: Mapping[Key, Key | None],
+    tasks: Mapping[Key, _Task],
+    workers: int,
+    bar: tqdm[Any],
+    failed: dict[Key, GaitNotFound],
+) -> None:
+    """Gaits in a pool of processes; each waits for the neighbour that it starts from."""
+    context = multiprocessing.get_context("spawn")
+    running: dict[Future[None], Key] = {}
+    with ProcessPoolExecutor(workers, context, initializer=follow_parent) as pool:
         try:
-            return optimize_gait(problem, initial=solved[neighbour])
+            while waiting or running:
+                for key in [k for k in waiting if parents[k] is None or parents[k] in done]:
+                    waiting.remove(key)
+                    task, robot = tasks[key], tasks[key].problem.robot
+                    options = {
+                        item.name: getattr(task.problem, item.name)
+                        for item in dataclasses.fields(GaitProblem)
+                        if item.name != "robot"
+                    }
+                    start = _start(key, parents, tasks)
+                    running[
+                        pool.submit(_work_in_process, robot.spec, options, task.path, start)
+                    ] = key
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    key = running.pop(future)
+                    try:
+                        future.result()
+                    except GaitNotFound as error:
+                        failed[key] = error
+                    done.add(key)
+                    bar.update()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()  # what they have not saved is solved again next time
+            raise
+
+
+def _work_in_process(
+    spec: RobotSpec, options: Mapping[str, Any], path: Path, start: Path | None
+) -> None:
+    _work(_Task(GaitProblem(load_robot(spec), **options), path), start)
+
+
+def _work(task: _Task, start: Path | None) -> None:
+    """Solve and audit one gait, and write its file."""
+    began = time.perf_counter()
+    solution = _solve(task.problem, None if start is None else _read(_Task(task.problem, start)))
+    found = audit(solution)
+    metadata = {
+        "problem": task.problem.options(),
+        "cost": [solution.cost],
+        "iterations": [solution.iterations],
+        "solve_time": [round(solution.solve_time, 4)],
+        "work_time": [round(time.perf_counter() - began, 2)],
+        "bezier_orders": {
+            name: [list(loss) for loss in losses]
+            for name, losses in bezier_orders(solution).items()
+        },
+    }
+    state = solution.state
+    arrays = to_arrays(GaitLibrary((solution.gait,), metadata, (found,)))
+    arrays |= {"x": state.x, "lam_x": state.lam_x, "lam_g": state.lam_g}
+    arrays["fingerprint"] = np.array(task.problem.fingerprint())
+    write_arrays(task.path, arrays)
+
+
+def _solve(problem: GaitProblem, neighbour: _Solved | None) -> GaitSolution:
+    """Start from the solved neighbour; where there is none, or that fails, from the crude guess."""
+    if neighbour is not None:
+        try:
+            return optimize_gait(problem, initial=neighbour.state, diagnose=False)
         except GaitNotFound:
             pass
     return optimize_gait(problem)
 
 
-def _metadata(robot: Robot, solutions: list[GaitSolution], seconds: float) -> dict[str, Any]:
-    """How the library was made."""
-    # Not `asdict`, which would copy the robot.
-    problem = {
-        item.name: getattr(solutions[0].problem, item.name)
-        for item in dataclasses.fields(GaitProblem)
-        if item.name not in ("robot", "speed")
-    }
-    return {
+def _read(task: _Task) -> _Solved:
+    """The file of one gait.
+
+    Raises:
+        FileProblem: It is damaged, or holds a gait of another problem.
+    """
+    path = task.path
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        if int(arrays["schema"]) != SCHEMA:
+            raise FileProblem(path, f"schema {arrays['schema']}, not {SCHEMA}", _AGAIN)
+        fingerprint = str(arrays["fingerprint"])
+        state = SolverState(*(np.array(arrays[key]) for key in ("x", "lam_x", "lam_g")))
+        if not all(np.all(np.isfinite(part)) for part in (state.x, state.lam_x, state.lam_g)):
+            raise ValueError("the solver's state is not finite")
+        solved = _Solved(from_arrays(arrays), state)
+    except (*DAMAGE, InvalidInput) as error:
+        raise FileProblem(path, f"damaged gait ({error})", _AGAIN) from error
+    if fingerprint != task.problem.fingerprint():
+        raise FileProblem(
+            path,
+            "a gait of another problem (robot, base, sequence, bounds or weights)",
+            "choose another folder, or delete this one",
+        )
+    return solved
+
+
+def _library(
+    robot: Robot,
+    gait: str,
+    solved: Mapping[Key, _Solved],
+    tasks: Mapping[Key, _Task],
+    home: float,
+) -> GaitLibrary:
+    """The gaits of all files, in the order of the library."""
+    order = sorted(solved, key=lambda key: (key[1], key[0]))
+    parts = [solved[key].library for key in order]
+    metadata: dict[str, Any] = {
         "urdf_sha256": robot.sha256,
-        "problem": problem,
+        "gait": gait,
+        "problem": tasks[order[0]].problem.options(),
         "solver": "IPOPT through CasADi, exact derivatives",
         "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
-        "cost": [solution.cost for solution in solutions],
-        "iterations": [solution.iterations for solution in solutions],
-        "solve_time": [round(solution.solve_time, 4) for solution in solutions],
-        "build_time": round(seconds, 2),
+        "bezier_orders": _worst_orders([part.metadata["bezier_orders"] for part in parts]),
     }
+    for name in ("cost", "iterations", "solve_time", "work_time"):
+        metadata[name] = [part.metadata[name][0] for part in parts]
+    gaits, audits = (tuple(getattr(part, key)[0] for part in parts) for key in ("gaits", "audit"))
+    return GaitLibrary(gaits, metadata, audits, home)
+
+
+def _worst_orders(each: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What Bezier polynomials of each order lose, the worst over the gaits."""
+    return {name: np.max([orders[name] for orders in each], axis=0).tolist() for name in each[0]}

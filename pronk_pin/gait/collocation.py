@@ -2,17 +2,19 @@
 
 Positions, velocities, accelerations, torques and contact forces are unknowns at every node, the
 midpoints of the mesh intervals included; so are the durations of the phases and the touchdown
-impulse. Every constraint of section II.B of the paper stands here under its name; bilateral
+impulses. Every constraint of section II.B of the paper stands here under its name; bilateral
 symmetry is in the folded model.
 
 In stance the feet's height is imposed at touchdown, their velocity by the impact, and their
 acceleration at every node: then the equations are independent, and nothing is asked twice.
+
+Which feet stand in which phase is data, `GaitProblem.sequence`: nothing here knows pronking.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -22,37 +24,8 @@ import numpy as np
 from .._typing import Array
 from ..robot import JOINTS
 from .folded_model import FoldedModel, fold
-from .newton_euler import NB_FOLDED
-from .problem import GaitProblem
+from .problem import PAIRS, ContactPhase, GaitProblem
 from .transcription import Constraint, Transcription, Unknown
-
-PHASES = ("stance", "flight")
-"""The phases of pronking; touchdown leads from the last one to the first."""
-
-UNITS = {
-    "average speed": "m",
-    "apex height": "m",
-    "dynamics": "N or N m",
-    "collocation": "m or rad",
-    "contact height": "m",
-    "contact acceleration": "m/s^2",
-    "touchdown impact": "N s",
-    "touchdown contact": "m/s",
-    "foot clearance": "m",
-    "lift-off continuity": "m or rad",
-    "periodicity": "m or rad",
-    "stride duration": "s",
-    "phase durations": "s",
-    "configuration limits": "rad",
-    "hip limit": "rad",
-    "trunk height": "m",
-    "velocity limits": "rad/s",
-    "torque limits": "N m",
-    "unilateral contact": "N",
-    "friction cone": "N",
-    "impulse cone": "N s",
-}
-"""Units of the constraints; where a constraint holds positions and velocities, the former's."""
 
 _TIP = 1e-6
 """Rounding of the friction cone's tip [N], which keeps its derivative finite."""
@@ -60,9 +33,14 @@ _TIP = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class _Phase:
-    """The unknowns of a phase, one column a node; midpoints are the odd columns."""
+    """The unknowns of a phase, one column a node; midpoints are the odd columns.
+
+    Attributes:
+        legs: Indices of the folded robot's legs that stand.
+    """
 
     name: str
+    legs: tuple[int, ...]
     q: ca.SX
     v: ca.SX
     a: ca.SX
@@ -88,24 +66,31 @@ def node_phases(intervals: int) -> Array:
     return nodes
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def transcribe(problem: GaitProblem) -> Transcription:
     """Write a gait problem as a nonlinear program with the parameters [speed, apex]."""
-    model = fold(problem.robot, problem.contact)
+    model = fold(problem.robot, problem.contact, problem.base)
     unknowns = _unknowns(problem, model)
-    stance, flight = (_phase(unknowns, name) for name in PHASES)
-    impulse = unknowns["impulse"].symbol
+    phases = [_phase(unknowns, model, phase) for phase in problem.sequence]
     speed, apex = ca.SX.sym("speed"), ca.SX.sym("apex")
-    constraints = (
-        *_motion(model, stance),
-        *_motion(model, flight),
-        *_standing(problem, model, stance),
-        *_flying(problem, model, flight, apex),
-        *_stride(problem, stance, flight, speed),
-        *_touchdown(problem, model, stance, flight, impulse),
-    )
-    cost = _cost(problem, stance) + _cost(problem, flight)
-    return Transcription.of(unknowns, ca.vertcat(speed, apex), cost, constraints)
+    constraints: list[Constraint] = []
+    for phase in phases:
+        constraints += _motion(model, phase)
+    for phase in phases:
+        constraints += _standing(problem, model, phase)
+    for leg in range(len(model.legs)):
+        constraints += _swinging(problem, model, phases, leg)
+    flights = [phase for phase in phases if not phase.legs]
+    for phase in flights:
+        # With several flights the trunk pitches through them and may have no top in any.
+        middle = phase.q[1, len(phase.s) // 2]
+        top = _apex(phase.s, phase.q[1, :]) if len(flights) == 1 else middle
+        constraints.append(Constraint("apex height", phase.name, top - apex))
+    constraints += _stride(problem, phases, speed)
+    for index in range(len(phases)):
+        constraints += _transition(problem, model, unknowns, phases, index)
+    cost = sum((_cost(problem, model, phase) for phase in phases), ca.SX(0))
+    return Transcription.of(unknowns, ca.vertcat(speed, apex), cost, tuple(constraints))
 
 
 def _unknowns(problem: GaitProblem, model: FoldedModel) -> dict[str, Unknown]:
@@ -115,46 +100,48 @@ def _unknowns(problem: GaitProblem, model: FoldedModel) -> dict[str, Unknown]:
     low, high = kept.q_min[joints], kept.q_max[joints]
     low = np.where(hip, np.maximum(low, -problem.hip_limit), low)
     high = np.where(hip, np.minimum(high, problem.hip_limit), high)
-    v_max = np.array([*[free] * NB_FOLDED, *kept.v_max[joints]])
-    tau_max = kept.tau_max[joints]
-    ground = np.tile([-free, -free, 0.0], len(model.legs))
-    unilateral = ("", "", "unilateral contact") * len(model.legs)
+    v_max = np.array([*[free] * model.nb, *problem.velocity_use * kept.v_max[joints]])
+    tau_max = problem.torque_use * kept.tau_max[joints]
 
-    q_limits = ("", "trunk height", *np.where(hip, "hip limit", "configuration limits"))
-    q_low, q_high = np.array([-free, problem.trunk_height, *low]), np.array([free, free, *high])
-    v_limits = ("",) * NB_FOLDED + ("velocity limits",) * model.nl
+    pitch = [problem.pitch_limit] * (model.nb - 2)
+    base_limits = ("", "trunk height", "pitch limit")[: model.nb]
+    q_limits = (*base_limits, *np.where(hip, "hip limit", "configuration limits"))
+    q_low = np.array([-free, problem.trunk_height, *np.negative(pitch), *low])
+    q_high = np.array([free, free, *pitch, *high])
+    v_limits = ("",) * model.nb + ("velocity limits",) * model.nl
     unbounded = np.full(model.nq, free)
     blocks = {
         "q": (q_low, q_high, q_limits),
         "v": (-v_max, v_max, v_limits),
         "a": (-unbounded, unbounded, ("",) * model.nq),
         "tau": (-tau_max, tau_max, ("torque limits",) * model.nl),
-        "lam": (ground, np.full(len(ground), free), unilateral),
     }
-    unknowns = {}
-    for name, intervals in zip(PHASES, problem.intervals, strict=True):
-        nodes = 2 * intervals + 1
-        for key, (lower, upper, limits) in blocks.items():
-            if name == "stance" or key != "lam":
-                symbol = ca.SX.sym(f"{name}_{key}", len(lower), nodes)
-                unknowns[f"{name}.{key}"] = Unknown(name, symbol, lower, upper, limits)
-        shortest, longest = np.array(getattr(problem, name))[:, None]
+    unknowns, impulses = {}, {}
+    for index, phase in enumerate(problem.sequence):
+        name, nodes, feet = phase.name, 2 * phase.intervals + 1, len(phase.stands)
+        ground = np.tile([-free, -free, 0.0], feet)
+        forces = (ground, np.full(len(ground), free), ("", "", "unilateral contact") * feet)
+        for key, (lower, upper, limits) in (blocks | ({"lam": forces} if feet else {})).items():
+            symbol = ca.SX.sym(f"{name}_{key}", len(lower), nodes)
+            unknowns[f"{name}.{key}"] = Unknown(name, symbol, lower, upper, limits)
+        shortest, longest = np.array(phase.duration)[:, None]
         symbol = ca.SX.sym(f"{name}_duration")
         unknowns[f"{name}.duration"] = Unknown(
             name, symbol, shortest, longest, ("phase durations",)
         )
-    symbol = ca.SX.sym("impulse", len(ground))
-    unknowns["impulse"] = Unknown("touchdown", symbol, *blocks["lam"])
-    return unknowns
+        if problem.landing(index):
+            symbol = ca.SX.sym(f"{name}_impulse", len(ground))
+            impulses[f"{name}.impulse"] = Unknown(f"touchdown of {name}", symbol, *forces)
+    return unknowns | impulses
 
 
-def _phase(unknowns: Mapping[str, Unknown], name: str) -> _Phase:
+def _phase(unknowns: Mapping[str, Unknown], model: FoldedModel, phase: ContactPhase) -> _Phase:
+    name, legs = phase.name, tuple(PAIRS.index(pair) for pair in phase.stands)
     symbols = {key: unknowns[f"{name}.{key}"].symbol for key in ("q", "v", "a", "tau", "duration")}
-    if name == "stance":
-        lam = unknowns["stance.lam"].symbol
-    else:
-        lam = ca.SX(unknowns["stance.lam"].symbol.shape[0], symbols["q"].shape[1])
-    return _Phase(name=name, lam=lam, **symbols)
+    lam = ca.SX(3 * len(model.legs), symbols["q"].shape[1])
+    for i, leg in enumerate(legs):
+        lam[3 * leg : 3 * leg + 3, :] = unknowns[f"{name}.lam"].symbol[3 * i : 3 * i + 3, :]
+    return _Phase(name=name, legs=legs, lam=lam, **symbols)
 
 
 def _motion(model: FoldedModel, phase: _Phase) -> list[Constraint]:
@@ -162,7 +149,7 @@ def _motion(model: FoldedModel, phase: _Phase) -> list[Constraint]:
     constraints = []
     for k in range(len(phase.s)):
         forces = model.dynamics(phase.q[:, k], phase.v[:, k], phase.a[:, k], phase.lam[:, k])
-        motors = ca.vertcat(ca.SX(NB_FOLDED, 1), phase.tau[:, k])
+        motors = ca.vertcat(ca.SX(model.nb, 1), phase.tau[:, k])
         constraints.append(Constraint("dynamics", f"{phase.name}, node {k}", forces - motors))
     for k, length in enumerate(np.diff(phase.s[::2])):
         h, where = phase.duration * length, f"{phase.name}, interval {k}"
@@ -175,33 +162,54 @@ def _motion(model: FoldedModel, phase: _Phase) -> list[Constraint]:
     return constraints
 
 
-def _standing(problem: GaitProblem, model: FoldedModel, stance: _Phase) -> list[Constraint]:
+def _feet(
+    model: FoldedModel, phase: _Phase, k: int, legs: Sequence[int]
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Height, contact velocity and contact acceleration of some feet at a node."""
+    position, velocity, acceleration = model.feet(phase.q[:, k], phase.v[:, k], phase.a[:, k])
+    columns = list(legs)
+    return position[2, columns], velocity[:, columns], acceleration[:, columns]
+
+
+def _standing(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> list[Constraint]:
     """Holonomic constraints (3) of the standing feet, and the friction cone."""
-    height = model.feet(stance.q[:, 0], stance.v[:, 0], stance.a[:, 0])[0][2, :]
-    touchdown = height - problem.robot.foot_radius
-    constraints = [Constraint("contact height", "stance, node 0", touchdown)]
-    for k in range(len(stance.s)):
-        where = f"stance, node {k}"
-        acceleration = model.feet(stance.q[:, k], stance.v[:, k], stance.a[:, k])[2]
+    constraints = []
+    for k in range(len(phase.s) if phase.legs else 0):
+        where = f"{phase.name}, node {k}"
+        acceleration = _feet(model, phase, k, phase.legs)[2]
         constraints.append(Constraint("contact acceleration", where, acceleration))
-        cone = _cone(stance.lam[:, k], problem.friction)
+        cone = _cone(phase.lam[:, k], phase.legs, problem.friction)
         constraints.append(Constraint("friction cone", where, cone, upper=np.inf))
     return constraints
 
 
-def _flying(
-    problem: GaitProblem, model: FoldedModel, flight: _Phase, apex: ca.SX
+def _swinging(
+    problem: GaitProblem, model: FoldedModel, phases: Sequence[_Phase], leg: int
 ) -> list[Constraint]:
-    """Apex of the trunk, and clearance of the feet (unilateral constraints in flight)."""
-    constraints = []
-    for k, s in enumerate(flight.s[1:-1], start=1):
-        # Flat at both ends: a parabola would fight the feet's zero velocity at lift-off.
-        profile = problem.clearance * 16 * s**2 * (1 - s) ** 2
-        height = model.feet(flight.q[:, k], flight.v[:, k], flight.a[:, k])[0][2, :]
-        clear = height - problem.robot.foot_radius - profile
-        constraints.append(Constraint("foot clearance", f"flight, node {k}", clear, upper=np.inf))
-    top = _apex(flight.s, flight.q[1, :])
-    constraints.append(Constraint("apex height", "flight", top - apex))
+    """Clearance of a foot over its swings (unilateral constraints in flight).
+
+    A swing goes from lift-off to touchdown, through as many phases as it takes.
+    """
+    n, constraints = len(phases), []
+    for first in range(n):
+        if leg in phases[first].legs or leg not in phases[first - 1].legs:
+            continue
+        length = next(i for i in range(1, n + 1) if leg in phases[(first + i) % n].legs)
+        swing = [phases[(first + i) % n] for i in range(length)]
+        total, passed = sum((phase.duration for phase in swing), ca.SX(0)), ca.SX(0)
+        for phase in swing:
+            last = len(phase.s) - 1 if phase is swing[-1] else len(phase.s)
+            for k in range(1, last):
+                alone = length == 1
+                s = phase.s[k] if alone else (passed + phase.duration * phase.s[k]) / total
+                # Flat at both ends: a parabola would fight the feet's zero velocity at lift-off.
+                profile = problem.clearance * 16 * s**2 * (1 - s) ** 2
+                height = _feet(model, phase, k, [leg])[0] - problem.robot.foot_radius
+                where = f"{phase.name}, node {k}"
+                constraints.append(
+                    Constraint("foot clearance", where, height - profile, upper=np.inf)
+                )
+            passed = passed + phase.duration
     return constraints
 
 
@@ -221,47 +229,65 @@ def _apex(s: Array, z: ca.SX) -> ca.SX:
     return top
 
 
-def _stride(problem: GaitProblem, stance: _Phase, flight: _Phase, speed: ca.SX) -> list[Constraint]:
-    """What holds the phases together: continuity, periodicity, speed."""
-    total = stance.duration + flight.duration
-    first, last = stance.q[:, 0], flight.q[:, -1]
-    off, on = "lift-off", "touchdown"
+def _stride(problem: GaitProblem, phases: Sequence[_Phase], speed: ca.SX) -> list[Constraint]:
+    """What the stride as a whole must be: its duration, its speed, where it begins."""
+    total = sum((phase.duration for phase in phases), ca.SX(0))
+    first, last = phases[0].q[0, 0], phases[-1].q[0, -1]
     return [
         Constraint("stride duration", "stride", total, *problem.stride),
-        Constraint("lift-off continuity", off, flight.q[:, 0] - stance.q[:, -1]),
-        Constraint("lift-off continuity", off, flight.v[:, 0] - stance.v[:, -1]),
-        Constraint("periodicity", on, last[1:] - first[1:]),
-        Constraint("periodicity", on, first[0]),  # x may begin anywhere; here it begins at 0
-        Constraint("average speed", "stride", last[0] - first[0] - speed * total),
+        Constraint("periodicity", "stride", first),  # x may begin anywhere; here it begins at 0
+        Constraint("average speed", "stride", last - first - speed * total),
     ]
 
 
-def _touchdown(
-    problem: GaitProblem, model: FoldedModel, stance: _Phase, flight: _Phase, impulse: ca.SX
+def _transition(
+    problem: GaitProblem,
+    model: FoldedModel,
+    unknowns: Mapping[str, Unknown],
+    phases: Sequence[_Phase],
+    index: int,
 ) -> list[Constraint]:
-    """Plastic impact: the impulses stop the feet, and lie in the friction cone."""
-    q, v = stance.q[:, 0], stance.v[:, 0]
-    residual = model.impact(q, v - flight.v[:, -1], impulse)
-    velocity = model.feet(q, v, stance.a[:, 0])[1]
-    cone = _cone(impulse, problem.friction)
+    """What leads into a phase: the motion goes on, but for the impact of the feet that land.
+
+    The impact is plastic: the impulses stop all standing feet, and lie in the friction cone.
+    """
+    phase, before = phases[index], phases[index - 1]
+    name, rows = ("phase continuity", slice(0, None)) if index else ("periodicity", slice(1, None))
+    where = f"{before.name} to {phase.name}"
+    q, v = phase.q[:, 0], phase.v[:, 0]
+    constraints = [Constraint(name, where, before.q[rows, -1] - q[rows])]
+    landing = [PAIRS.index(pair) for pair in problem.landing(index)]
+    if not landing:
+        return [*constraints, Constraint(name, where, before.v[:, -1] - v)]
+    impulse = ca.SX(3 * len(model.legs), 1)
+    for i, leg in enumerate(phase.legs):
+        symbol = unknowns[f"{phase.name}.impulse"].symbol
+        impulse[3 * leg : 3 * leg + 3] = symbol[3 * i : 3 * i + 3]
+    where = f"touchdown of {phase.name}"
+    height = _feet(model, phase, 0, landing)[0] - problem.robot.foot_radius
+    velocity = _feet(model, phase, 0, phase.legs)[1]
+    residual = model.impact(q, v - before.v[:, -1], impulse)
+    cone = _cone(impulse, phase.legs, problem.friction)
     return [
-        Constraint("touchdown impact", "touchdown", residual),
-        Constraint("touchdown contact", "touchdown", velocity),
-        Constraint("impulse cone", "touchdown", cone, upper=np.inf),
+        *constraints,
+        Constraint("contact height", f"{phase.name}, node 0", height),
+        Constraint("touchdown impact", where, residual),
+        Constraint("touchdown contact", where, velocity),
+        Constraint("impulse cone", where, cone, upper=np.inf),
     ]
 
 
-def _cone(forces: ca.SX, friction: float) -> ca.SX:
-    """Friction cone of each foot, mu f_n - |f_t|: not negative where the foot holds."""
-    f = ca.reshape(forces, 3, -1)
+def _cone(forces: ca.SX, legs: Sequence[int], friction: float) -> ca.SX:
+    """Friction cone of each standing foot, mu f_n - |f_t|: not negative where the foot holds."""
+    f = ca.reshape(forces, 3, -1)[:, list(legs)]
     return friction * f[2, :] - ca.sqrt(f[0, :] ** 2 + f[1, :] ** 2 + _TIP**2)
 
 
-def _cost(problem: GaitProblem, phase: _Phase) -> ca.SX:
+def _cost(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> ca.SX:
     """Cost (6) over a phase, by Simpson's rule; the kept legs count twice."""
     rate = 2.0 * (
         problem.torque_weight * ca.sum1(phase.tau**2)
-        + problem.velocity_weight * ca.sum1(phase.v[NB_FOLDED:, :] ** 2)
+        + problem.velocity_weight * ca.sum1(phase.v[model.nb :, :] ** 2)
     )  # (1, nodes)
     lengths = np.diff(phase.s[::2])
     weights = np.zeros(len(phase.s))

@@ -6,9 +6,11 @@ trunk held to the sagittal plane without rotation its coordinates are
 
     ``q = [x, z, front hip, thigh, calf, rear hip, thigh, calf]``  [m, m, rad, ...]  (8)
 
-and its equations are the x, z and left-leg rows of the whole robot's: no quaternion, no redundant
-right side. The trunk's centre of mass is taken to lie in the mirror plane; what it lies beside it
-gives a roll moment, which the guide of the locked trunk takes.
+with the pitch after z where it is free (9), and its equations are the x, z, pitch and left-leg rows
+of the whole robot's: no quaternion, no redundant right side. The trunk's centre of mass is taken to
+lie in the mirror plane; what it lies beside it gives a roll moment, which the guide that keeps the
+trunk in the plane takes. Where the URDF's left and right legs differ, the folded leg is their mean,
+which leaves the motion exact: `asymmetry` says what each side needs besides.
 
 Everything is a CasADi SX expression, so that the solver gets exact derivatives.
 """
@@ -25,9 +27,8 @@ from .._typing import Array, BoolArray, IntArray
 from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..robot import JOINTS, Robot
-from .newton_euler import NB_FOLDED, FrameMotion, newton_euler
-
-_MIRROR = {"L": "R", "R": "L"}
+from .newton_euler import BASE_COORDINATES, FrameMotion, mirrored, newton_euler
+from .problem import Base
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +40,17 @@ class FoldedModel:
     Attributes:
         robot: The robot it was folded from.
         contact: The contact model.
+        base: How the trunk may move.
         legs: The legs that are kept, front to rear.
         lever: From a foot's centre to where the ground acts, in the world [m], shape (3,).
-        dynamics: ``(q, v, a, lam) -> forces`` (8): what must act along each coordinate besides
-            the contact forces `lam` (6) [N]: zero along x and z, the motor torques along the
-            joints. Eq. (2) of the paper.
-        impact: ``(q, dv, impulse) -> residual`` (8): zero where the contact impulses [N s] cause
-            the jump `dv` of the velocity, with no impulse from the motors.
+        dynamics: ``(q, v, a, lam) -> forces`` (8 or 9): what must act along each coordinate
+            besides the contact forces `lam` (6) [N]: zero for the trunk, the motor torques along
+            the joints. Eq. (2) of the paper.
+        impact: ``(q, dv, impulse) -> residual`` (8 or 9): zero where the contact impulses [N s]
+            cause the jump `dv` of the velocity, with no impulse from the motors.
+        asymmetry: ``(q, v, a) -> torques`` (6): what the left motors need more than the mean of
+            left and right, and the right ones less [N m].
+        jump_asymmetry: ``(q, dv) -> momentum`` (6): the same for a jump of the velocity [N m s].
         feet: ``(q, v, a) -> (position, velocity, acceleration)``, each (3, 2): the position is
             that of the spheres' centres [m]; velocity and acceleration are those that vanish in
             contact. Eq. (3) of the paper.
@@ -53,11 +58,19 @@ class FoldedModel:
 
     robot: Robot
     contact: Contact
+    base: Base
     legs: tuple[str, ...]
     lever: Array
     dynamics: ca.Function
     impact: ca.Function
+    asymmetry: ca.Function
+    jump_asymmetry: ca.Function
     feet: ca.Function
+
+    @property
+    def nb(self) -> int:
+        """Coordinates of the trunk."""
+        return BASE_COORDINATES[self.base]
 
     @property
     def nl(self) -> int:
@@ -67,7 +80,7 @@ class FoldedModel:
     @property
     def nq(self) -> int:
         """Coordinates of the folded robot."""
-        return NB_FOLDED + self.nl
+        return self.nb + self.nl
 
     def joint_rows(self) -> IntArray:
         """Which of the robot's joints the folded robot keeps, shape (6,)."""
@@ -97,6 +110,12 @@ class FoldedModel:
         """Joint quantities of the whole robot (..., 12) from those of the kept legs (..., 6)."""
         return np.asarray(folded[..., self.joint_index()] * self.joint_sign())
 
+    def unfold_torques(self, mean: Array, left: Array) -> Array:
+        """Torques of the whole robot (..., 12) from the mean of left and right (..., 6) and what
+        the left motors need beyond it (..., 6)."""
+        sides = np.where(np.repeat(self._right(), len(JOINTS)), -1.0, 1.0)
+        return np.asarray(self.unfold_joints(mean) + sides * self.unfold_joints(left))
+
     def unfold_forces(self, folded: Array) -> Array:
         """Contact forces of the whole robot (..., 4, 3) from those of the kept feet (..., 6)."""
         by_leg = folded.reshape(*folded.shape[:-1], len(self.legs), 3)
@@ -111,13 +130,8 @@ def _leg_joints(legs: IntArray) -> IntArray:
     return np.asarray(legs[:, None] * len(JOINTS) + np.arange(len(JOINTS))).ravel()
 
 
-def mirrored(leg: str) -> str:
-    """The leg on the other side: FL and FR, RL and RR."""
-    return leg[:-1] + _MIRROR[leg[-1]]
-
-
 @lru_cache(maxsize=8)
-def fold(robot: Robot, contact: Contact = "rolling") -> FoldedModel:
+def fold(robot: Robot, contact: Contact = "rolling", base: Base = "locked") -> FoldedModel:
     """Fold a robot on its mirror plane.
 
     Raises:
@@ -129,21 +143,29 @@ def fold(robot: Robot, contact: Contact = "rolling") -> FoldedModel:
             f"the legs {', '.join(robot.legs)} do not pair left and right; "
             "name them ..L and ..R in the RobotSpec"
         )
-    nq = NB_FOLDED + len(legs) * len(JOINTS)
+    nq = BASE_COORDINATES[base] + len(legs) * len(JOINTS)
     q, v, a = (ca.SX.sym(name, nq) for name in "qva")
     lam = ca.SX.sym("lam", 3, len(legs))
     lever = np.array([0.0, 0.0, -robot.foot_radius if contact == "rolling" else 0.0])
     gravity, at_rest = np.array(robot.model.gravity.linear), ca.SX.zeros(nq)
-    forces, feet = newton_euler(robot, legs, (q, v, a), lam, gravity, lever)
+    forces, feet = newton_euler(robot, legs, (q, v, a), lam, gravity, lever, base)
     # Over an instant only M dv and the impulses count: no gravity, no velocity products.
-    jump, _ = newton_euler(robot, legs, (q, at_rest, a), lam, np.zeros(3), lever)
+    jump, _ = newton_euler(robot, legs, (q, at_rest, a), lam, np.zeros(3), lever, base)
+    nb, none = BASE_COORDINATES[base], ca.SX.zeros(3, len(legs))
+    apart, _ = newton_euler(robot, legs, (q, v, a), none, gravity, lever, base, "difference")
+    leap, _ = newton_euler(
+        robot, legs, (q, at_rest, a), none, np.zeros(3), lever, base, "difference"
+    )
     return FoldedModel(
         robot=robot,
         contact=contact,
+        base=base,
         legs=legs,
         lever=lever,
         dynamics=ca.Function("dynamics", [q, v, a, ca.vec(lam)], [forces]),
         impact=ca.Function("impact", [q, a, ca.vec(lam)], [jump]),
+        asymmetry=ca.Function("asymmetry", [q, v, a], [apart[nb:]]),
+        jump_asymmetry=ca.Function("jump_asymmetry", [q, a], [leap[nb:]]),
         feet=ca.Function("feet", [q, v, a], _contact_motion(feet, lever)),
     )
 

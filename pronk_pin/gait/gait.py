@@ -6,13 +6,14 @@ on all four feet, then `flight` on none; the touchdown impact closes the cycle.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from .._typing import Array
 from ..errors import InvalidInput
-from ..robot import Robot
+from ..robot import NB, Robot
 from . import bezier
 
 ARRAYS = ("joints", "base", "tau", "lam")
@@ -40,12 +41,41 @@ class Motion:
     lam: Array
 
 
+def planar_state(
+    robot: Robot,
+    position: Sequence[Array],
+    velocity: Sequence[Array],
+    acceleration: Sequence[Array],
+) -> tuple[Array, Array, Array]:
+    """Whole-body q (n, 19), v and a (n, 18) of a robot whose trunk moves in the sagittal plane.
+
+    Args:
+        robot: The robot.
+        position, velocity, acceleration: Each the trunk's x, z and pitch in the world (n, 3), and
+            the joints (n, 12), or their derivatives by time.
+    """
+    base, rates, bends = position[0], velocity[0], acceleration[0]
+    place = np.stack([base[:, 0], np.zeros(len(base)), base[:, 1]], axis=-1)
+    q = robot.q_from_base(place, position[1], pitch=base[:, 2])
+    cos, sin = np.cos(base[:, 2]), np.sin(base[:, 2])
+    vx, vz, rate = rates.T
+    ax, az, bend = bends.T
+    v, a = np.zeros((2, len(base), robot.nv))
+    v[:, 0], v[:, 2], v[:, 4] = cos * vx - sin * vz, sin * vx + cos * vz, rate
+    # Body-frame derivative: R^T a_world - omega x v_body, with omega along y.
+    a[:, 0] = cos * ax - sin * az - rate * v[:, 2]
+    a[:, 2] = sin * ax + cos * az + rate * v[:, 0]
+    a[:, 4] = bend
+    v[:, NB:], a[:, NB:] = velocity[1], acceleration[1]
+    return q, v, a
+
+
 @dataclass(frozen=True)
 class GaitPhase:
     """One phase of a gait.
 
     Attributes:
-        name: "stance" or "flight".
+        name: Its name in the contact sequence: "stance" or "flight" in pronking.
         feet: Legs whose feet stand on the ground.
         duration: How long the phase lasts [s].
         joints: Coefficients of the joint angles [rad], shape (12, order + 1): B of eq. (7).
@@ -78,25 +108,14 @@ class GaitPhase:
     def motion(self, robot: Robot, s: Array) -> Motion:
         """The whole-body motion at the phases s, shape (n,)."""
         s = np.atleast_1d(np.asarray(s, dtype=float))
-        joints, joint_rates = self.joint_reference(s)
-        base, base_rates = self.base_reference(s)
-        joint_acc = bezier.evaluate(self.joints, s, derivative=2) / self.duration**2
-        base_acc = bezier.evaluate(self.base, s, derivative=2) / self.duration**2
-
-        zero = np.zeros(len(s))
-        position = np.stack([base[:, 0], zero, base[:, 1]], axis=-1)
-        q = robot.q_from_base(position, joints, pitch=base[:, 2])
-        cos, sin = np.cos(base[:, 2]), np.sin(base[:, 2])
-        vx, vz, rate = base_rates.T
-        ax, az, pitch_acc = base_acc.T
-        v = np.zeros((len(s), robot.nv))
-        v[:, 0], v[:, 2], v[:, 4] = cos * vx - sin * vz, sin * vx + cos * vz, rate
-        v[:, 6:] = joint_rates
-        a = np.zeros_like(v)
-        # Body-frame derivative: R^T a_world - omega x v_body, with omega along y.
-        a[:, 0] = cos * ax - sin * az - rate * v[:, 2]
-        a[:, 2] = sin * ax + cos * az + rate * v[:, 0]
-        a[:, 4], a[:, 6:] = pitch_acc, joint_acc
+        curves = [
+            [
+                bezier.evaluate(coefficients, s, derivative=d) / self.duration**d
+                for coefficients in (self.base, self.joints)
+            ]
+            for d in range(3)
+        ]
+        q, v, a = planar_state(robot, *curves)
         return Motion(
             t=s * self.duration,
             q=q,

@@ -1,11 +1,10 @@
-"""The gait library: gaits by speed, interpolated between (eq. 13), saved as one `.npz`."""
+"""The gait library: gaits by speed and apex, interpolated between (eq. 13), in one `.npz`."""
 
 from __future__ import annotations
 
-import itertools
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import resources
@@ -15,33 +14,55 @@ from typing import Any
 import numpy as np
 
 from .._typing import Array
-from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
+from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
+from ..robot import ROBOTS, Robot, load_robot
+from .checks import Audit
 from .gait import ARRAYS, Gait, GaitPhase
+from .problem import Base
+from .residual import GaitResidual, gait_residual
+from .style import library_name
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the file format."""
 
 _REBUILD = "make it again with 'pronk-pin gaits build'"
 
+_SAME = 1e-9
+"""Speeds [m/s] or heights [m] closer than this are one."""
+
 
 @dataclass(frozen=True)
 class GaitLibrary:
-    """Gaits of one robot, ordered by speed.
+    """Gaits of one robot, on a grid of speeds and apex heights.
 
     Attributes:
-        gaits: The gaits, their speeds increasing.
+        gaits: The gaits of the whole grid, ordered by apex and then by speed.
         metadata: How it was made: robot, SHA-256 of its URDF, problem, solver, versions.
-        audit: For each gait (in order) the named checks with their worst values.
+        audit: For each gait (in order) what its audit found; empty if there was none.
+        apex: The apex of the gaits that are meant where none is asked for [m]; by default the
+            lowest.
     """
 
     gaits: tuple[Gait, ...]
     metadata: Mapping[str, Any] = field(default_factory=dict)
-    audit: tuple[Mapping[str, float], ...] = ()
+    audit: tuple[Audit, ...] = ()
+    apex: float = np.nan
 
     def __post_init__(self) -> None:
-        speeds = [gait.speed for gait in self.gaits]
-        if not speeds or any(b <= a for a, b in itertools.pairwise(speeds)):
-            raise InvalidInput(f"a gait library needs gaits of increasing speed, not {speeds}")
+        grid = [(apex, speed) for apex in self.apexes for speed in self.speeds]
+        have = [(gait.apex, gait.speed) for gait in self.gaits]
+        if not have or len(have) != len(grid) or not np.allclose(have, grid, rtol=0, atol=_SAME):
+            raise InvalidInput(
+                "a gait library needs one gait for each speed at each apex, ordered by apex and "
+                f"then by increasing speed, not (apex, speed) = {have}"
+            )
+        if len(self.audit) not in (0, len(self.gaits)):
+            raise InvalidInput(
+                f"{len(self.audit)} audits for {len(self.gaits)} gaits; give each one"
+            )
+        if np.isnan(self.apex):
+            object.__setattr__(self, "apex", float(self.apexes[0]))
+        _index(self.apexes, self.apex, "apex")
 
     @property
     def robot(self) -> str:
@@ -50,24 +71,89 @@ class GaitLibrary:
 
     @property
     def speeds(self) -> Array:
-        """Speeds of the gaits [m/s], shape (n,)."""
-        return np.array([gait.speed for gait in self.gaits])
+        """Speeds of the grid [m/s], increasing, shape (n,)."""
+        return _distinct(gait.speed for gait in self.gaits)
 
-    def at(self, speed: float) -> Gait:
-        """The gait at a speed [m/s], interpolated between the two closest ones: eq. (13).
+    @property
+    def apexes(self) -> Array:
+        """Apex heights of the grid [m], increasing, shape (m,)."""
+        return _distinct(gait.apex for gait in self.gaits)
+
+    @property
+    def base(self) -> Base:
+        """How the trunk may move."""
+        base: Base = self.metadata.get("problem", {}).get("base", "locked")
+        return base
+
+    def index(self, speed: float, apex: float | None = None) -> int:
+        """Where in `gaits` a gait of the grid is.
+
+        Raises:
+            InvalidInput: There is no such gait; the error lists the grid.
+        """
+        row = _index(self.apexes, self.apex if apex is None else apex, "apex")
+        return row * len(self.speeds) + _index(self.speeds, speed, "speed")
+
+    def at_apex(self, apex: float | None = None) -> GaitLibrary:
+        """The part of the library at one apex of the grid; by default the library's own.
+
+        Raises:
+            InvalidInput: There is no such apex; the error lists the grid.
+        """
+        height = self.apex if apex is None else apex
+        n, row = len(self.speeds), _index(self.apexes, height, "apex")
+        part = slice(row * n, (row + 1) * n)
+        metadata = {
+            key: value[part] if key in PER_GAIT else value for key, value in self.metadata.items()
+        }
+        return GaitLibrary(self.gaits[part], metadata, self.audit[part])
+
+    def at(self, speed: float, apex: float | None = None) -> Gait:
+        """The gait at a speed [m/s] and apex [m], interpolated in both: eq. (13).
+
+        An interpolated gait obeys the equations of motion only nearly; `residual` tells how nearly.
+
+        Args:
+            speed: Speed [m/s].
+            apex: Greatest height of the trunk [m]; by default `apex` of the library.
 
         Raises:
             SpeedOutOfRange: The library does not cover the speed.
+            ApexOutOfRange: The library does not cover the apex.
         """
-        speeds = self.speeds
-        nearest = int(np.argmin(np.abs(speeds - speed)))
-        if abs(speeds[nearest] - speed) < 1e-9:
-            return self.gaits[nearest]
-        if not speeds[0] <= speed <= speeds[-1]:
+        speeds, apexes = self.speeds, self.apexes
+        height = self.apex if apex is None else apex
+        if not speeds[0] - _SAME <= speed <= speeds[-1] + _SAME:
             raise SpeedOutOfRange(speed, float(speeds[0]), float(speeds[-1]))
-        b = int(np.searchsorted(speeds, speed))
-        lower, upper = self.gaits[b - 1], self.gaits[b]
-        return lower.blend(upper, (speed - lower.speed) / (upper.speed - lower.speed))
+        if not apexes[0] - _SAME <= height <= apexes[-1] + _SAME:
+            raise ApexOutOfRange(height, float(apexes[0]), float(apexes[-1]))
+        rows = []
+        for row, row_weight in _neighbours(apexes, height):
+            gaits = [
+                (self.gaits[row * len(speeds) + column], weight)
+                for column, weight in _neighbours(speeds, speed)
+            ]
+            rows.append((_blend(gaits), row_weight))
+        return _blend(rows)
+
+    def residual(
+        self, speed: float, apex: float | None = None, *, robot: Robot | None = None
+    ) -> GaitResidual:
+        """How nearly the gait at a speed and apex obeys the equations of motion (2).
+
+        Args:
+            speed: Speed [m/s].
+            apex: Greatest height of the trunk [m]; by default `apex` of the library.
+            robot: The robot; by default the one that is known by the library's name.
+
+        Raises:
+            SpeedOutOfRange: The library does not cover the speed.
+            ApexOutOfRange: The library does not cover the apex.
+            UnknownName: The robot is not known by name; pass it.
+        """
+        robot = load_robot(self.robot) if robot is None else robot
+        contact = self.metadata.get("problem", {}).get("contact", "rolling")
+        return gait_residual(robot, self.at(speed, apex), contact=contact, base=self.base)
 
     def save(self, path: Path | str) -> Path:
         """Write the library to an `.npz` file.
@@ -76,34 +162,23 @@ class GaitLibrary:
             FileProblem: The file cannot be written.
         """
         path = Path(path)
-        arrays: dict[str, Any] = {
-            "schema": np.array(SCHEMA),
-            "speed": self.speeds,
-            "apex": np.array([gait.apex for gait in self.gaits]),
-            "phases": np.array([phase.name for phase in self.gaits[0].phases]),
-            "feet": np.array([",".join(phase.feet) for phase in self.gaits[0].phases]),
-            "metadata": np.array(json.dumps({**self.metadata, "robot": self.robot})),
-            "audit": np.array(json.dumps([dict(entry) for entry in self.audit])),
-        }
-        for i, phase in enumerate(self.gaits[0].phases):
-            members = [gait.phases[i] for gait in self.gaits]
-            arrays[f"{phase.name}.duration"] = np.array([member.duration for member in members])
-            for name in ARRAYS:
-                arrays[f"{phase.name}.{name}"] = np.stack([getattr(m, name) for m in members])
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("wb") as file:
-                np.savez_compressed(file, **arrays)
-        except OSError as error:
-            raise cannot_write(path, error, "choose another") from error
+        write_arrays(path, to_arrays(self))
         return path
 
     @classmethod
-    def load(cls, path: Path | str) -> GaitLibrary:
-        """Read a library.
+    def load(
+        cls, path: Path | str, *, robot: Robot | None = None, audited: bool = True
+    ) -> GaitLibrary:
+        """Read a library, and check that it fits the robot and that its gaits passed their audit.
+
+        Args:
+            path: The file.
+            robot: The robot that the gaits are for; by default the one that is known by the name
+                in the file. For a robot of one's own, without it the URDF is not compared.
+            audited: Refuse gaits without an audit, or with one that failed.
 
         Raises:
-            FileProblem: The file is missing, damaged, or of another schema.
+            FileProblem: The file is missing, damaged, of another schema or robot, or not audited.
         """
         path = Path(path)
         if not path.is_file():
@@ -113,12 +188,59 @@ class GaitLibrary:
                 arrays = {name: file[name] for name in file.files}
             if int(arrays["schema"]) != SCHEMA:
                 raise FileProblem(path, f"schema {arrays['schema']}, not {SCHEMA}", _REBUILD)
-            return _from_arrays(arrays)
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            library = from_arrays(arrays)
+        except (*DAMAGE, InvalidInput) as error:
             raise FileProblem(path, f"damaged gait library ({error})", _REBUILD) from error
+        _check_model(path, library, robot)
+        if audited:
+            _check_audit(path, library)
+        return library
 
 
-def _from_arrays(arrays: Mapping[str, Any]) -> GaitLibrary:
+DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile)
+"""What reading a damaged `.npz` raises."""
+
+PER_GAIT = ("cost", "iterations", "solve_time", "work_time")
+"""Metadata with one value for each gait."""
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write an `.npz` in one go: who interrupts it leaves no half of a file.
+
+    Raises:
+        FileProblem: The file cannot be written.
+    """
+    partial = path.with_name(path.name + ".partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez_compressed(file, **arrays)
+        partial.replace(path)
+    except OSError as error:
+        raise cannot_write(path, error, "choose another") from error
+
+
+def to_arrays(library: GaitLibrary) -> dict[str, Any]:
+    """A library as an `.npz` holds it."""
+    arrays: dict[str, Any] = {
+        "schema": np.array(SCHEMA),
+        "speed": np.array([gait.speed for gait in library.gaits]),
+        "apex": np.array([gait.apex for gait in library.gaits]),
+        "default_apex": np.array(library.apex),
+        "phases": np.array([phase.name for phase in library.gaits[0].phases]),
+        "feet": np.array([",".join(phase.feet) for phase in library.gaits[0].phases]),
+        "metadata": np.array(json.dumps({**library.metadata, "robot": library.robot})),
+        "audit": np.array(json.dumps([audit.as_json() for audit in library.audit])),
+    }
+    for i, phase in enumerate(library.gaits[0].phases):
+        members = [gait.phases[i] for gait in library.gaits]
+        arrays[f"{phase.name}.duration"] = np.array([member.duration for member in members])
+        for name in ARRAYS:
+            arrays[f"{phase.name}.{name}"] = np.stack([getattr(m, name) for m in members])
+    return arrays
+
+
+def from_arrays(arrays: Mapping[str, Any]) -> GaitLibrary:
     """Put a library together again; a missing or misshapen array raises."""
     metadata = json.loads(str(arrays["metadata"]))
     names = [str(name) for name in arrays["phases"]]
@@ -128,21 +250,100 @@ def _from_arrays(arrays: Mapping[str, Any]) -> GaitLibrary:
         phases = []
         for name, standing in zip(names, feet, strict=True):
             coefficients = {key: np.array(arrays[f"{name}.{key}"][k]) for key in ARRAYS}
-            if not all(np.all(np.isfinite(array)) for array in coefficients.values()):
-                raise ValueError(f"{name} at {speed:g} m/s is not finite")
             duration = float(arrays[f"{name}.duration"][k])
+            finite = all(np.all(np.isfinite(array)) for array in coefficients.values())
+            if not (finite and np.isfinite(duration)):
+                raise ValueError(f"{name} at {speed:g} m/s is not finite")
             phases.append(GaitPhase(name, standing, duration, **coefficients))
         apex = float(arrays["apex"][k])
         gaits.append(Gait(metadata["robot"], float(speed), apex, tuple(phases)))
-    return GaitLibrary(tuple(gaits), metadata, tuple(json.loads(str(arrays["audit"]))))
+    entries = json.loads(str(arrays["audit"]))
+    audits = []
+    if entries:
+        audits = [
+            Audit.from_json(gait.speed, entry) for gait, entry in zip(gaits, entries, strict=True)
+        ]
+    return GaitLibrary(tuple(gaits), metadata, tuple(audits), float(arrays["default_apex"]))
 
 
-@lru_cache(maxsize=4)
-def load_library(robot: str = "a1") -> GaitLibrary:
+def _check_model(path: Path, library: GaitLibrary, robot: Robot | None) -> None:
+    """The gaits were made for the URDF that is installed."""
+    if robot is None and library.robot not in ROBOTS:
+        return
+    robot = load_robot(library.robot) if robot is None else robot
+    if library.robot != robot.name:
+        raise FileProblem(
+            path, f"gaits of {library.robot}, not of {robot.name}", "choose the robot's own library"
+        )
+    made_for = library.metadata.get("urdf_sha256", "unknown")
+    if made_for != robot.sha256:
+        raise FileProblem(
+            path,
+            f"made for another model of {robot.name}: SHA-256 of its URDF {made_for[:12]}, "
+            f"of {robot.urdf_path} {robot.sha256[:12]}",
+            _REBUILD,
+        )
+
+
+def _check_audit(path: Path, library: GaitLibrary) -> None:
+    if not library.audit:
+        raise FileProblem(path, "gaits without an audit", _REBUILD)
+    for gait, found in zip(library.gaits, library.audit, strict=True):
+        if not found.passed:
+            failed = ", ".join(check.name for check in found.failures)
+            raise FileProblem(
+                path,
+                f"the gait at {gait.speed:g} m/s, apex {gait.apex:g} m, fails its audit ({failed})",
+                "see it with 'pronk-pin gaits show --library', and build it anew",
+            )
+
+
+def _distinct(values: Iterable[float]) -> Array:
+    """Values in increasing order, those that are one but for round-off once."""
+    ordered = np.array(sorted(values))
+    return ordered[np.concatenate([[True], np.diff(ordered) > _SAME])] if ordered.size else ordered
+
+
+def _index(grid: Array, value: float, name: str) -> int:
+    nearest = int(np.argmin(np.abs(grid - value)))
+    if not abs(grid[nearest] - value) < _SAME:
+        listed = ", ".join(f"{v:g}" for v in grid)
+        raise InvalidInput(f"the library has no {name} {value:g}; choose one of: {listed}")
+    return nearest
+
+
+def _neighbours(grid: Array, value: float) -> list[tuple[int, float]]:
+    """Points of a grid around a value, with their weights: two, or one where it hits."""
+    nearest = int(np.argmin(np.abs(grid - value)))
+    if abs(grid[nearest] - value) < _SAME:
+        return [(nearest, 1.0)]
+    b = int(np.searchsorted(grid, value))
+    weight = float((value - grid[b - 1]) / (grid[b] - grid[b - 1]))
+    return [(b - 1, 1.0 - weight), (b, weight)]
+
+
+def _blend(weighted: list[tuple[Gait, float]]) -> Gait:
+    if len(weighted) == 1:
+        return weighted[0][0]
+    (lower, _), (upper, weight) = weighted
+    return lower.blend(upper, weight)
+
+
+@lru_cache(maxsize=8)
+def load_library(
+    robot: str = "a1", *, gait: str = "pronk", base: Base | None = None
+) -> GaitLibrary:
     """The gait library that is shipped for a robot.
 
+    Args:
+        robot: Name of the robot.
+        gait: "pronk" or "bound".
+        base: How the trunk may move: "locked" or "sagittal"; None for the gait's own.
+
     Raises:
+        UnknownName: There is no such gait.
         FileProblem: None is shipped for it.
     """
-    with resources.as_file(resources.files(__package__) / "data" / f"{robot}.npz") as path:
+    name = library_name(robot, gait, base)
+    with resources.as_file(resources.files(__package__) / "data" / f"{name}.npz") as path:
         return GaitLibrary.load(path)

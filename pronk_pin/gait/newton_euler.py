@@ -6,17 +6,25 @@ world axes, with classical accelerations, keep it plain.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from .._typing import Array
 from ..robot import JOINTS, Robot
+from .problem import Base
 
-NB_FOLDED = 2
-"""Coordinates of the trunk: x and z."""
+BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3}
+"""Coordinates of the trunk: x and z, and pitch where it is free."""
+
+
+Half = Literal["mean", "difference"]
+"""Which half of a pair of legs: their mean, or half of what the left one differs by."""
+
+_MIRROR = {"L": "R", "R": "L"}
 
 
 class FrameMotion(NamedTuple):
@@ -30,6 +38,34 @@ class FrameMotion(NamedTuple):
     alpha: ca.SX
 
 
+class _Inertia(NamedTuple):
+    """Inertia of a body about the origin of its frame: what forces are linear in."""
+
+    mass: float
+    """[kg]"""
+    first: Array
+    """Mass times centre of mass [kg m], shape (3,)."""
+    second: Array
+    """Rotational inertia about the origin [kg m^2], shape (3, 3)."""
+
+    def mean(self, other: _Inertia) -> _Inertia:
+        """Halfway to another one."""
+        return _Inertia(
+            0.5 * (self.mass + other.mass),
+            0.5 * (self.first + other.first),
+            0.5 * (self.second + other.second),
+        )
+
+    def mirrored(self) -> _Inertia:
+        """Seen in the mirror y = 0."""
+        flip = np.array([1.0, -1.0, 1.0])
+        return _Inertia(self.mass, flip * self.first, np.outer(flip, flip) * self.second)
+
+    def minus(self) -> _Inertia:
+        """What takes it away."""
+        return _Inertia(-self.mass, -self.first, -self.second)
+
+
 @dataclass(frozen=True)
 class _Link:
     """A link as Pinocchio has it, with the joint that carries it.
@@ -37,18 +73,14 @@ class _Link:
     Attributes:
         rotation, translation: Placement of the joint in its parent, shapes (3, 3) and (3,).
         axis: Joint axis in the joint's frame, shape (3,).
-        mass: Mass [kg].
-        com: Centre of mass in the joint's frame [m], shape (3,).
-        inertia: Rotational inertia about the centre of mass [kg m^2], shape (3, 3).
+        body: Inertia, in the joint's frame.
         armature: Inertia of the rotor as the joint feels it [kg m^2].
     """
 
     rotation: Array
     translation: Array
     axis: Array
-    mass: float
-    com: Array
-    inertia: Array
+    body: _Inertia
     armature: float
 
 
@@ -59,52 +91,71 @@ def newton_euler(
     lam: ca.SX,
     gravity: Array,
     lever: Array,
+    base: Base,
+    half: Half = "mean",
 ) -> tuple[ca.SX, list[FrameMotion]]:
     """What forces a motion of the folded robot needs.
 
     Args:
         robot: The robot.
         legs: The legs that are kept; each counts twice on the trunk.
-        state: q, v and a of the folded robot, (8,) each.
+        state: q, v and a of the folded robot, (8,) each, or (9,) with pitch.
         lam: Contact forces of the kept feet in the world frame [N], (3, feet).
         gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
         lever: From a foot's centre to where `lam` acts, in the world [m], shape (3,).
+        base: How the trunk may move.
+        half: With which inertias of the legs. Where left and right differ, the mean of a leg and
+            its mirror image gives what the pair needs on average, and the trunk exactly; half
+            their difference, with no trunk and no forces, what the left leg needs beyond that, and
+            the right one less.
 
     Returns:
-        The forces that must act along each coordinate (8), and the motion of the feet.
+        The forces that must act along each coordinate (8 or 9), and the motion of the feet.
     """
     q, v, a = state
-    trunk = _planar(q[:NB_FOLDED], v[:NB_FOLDED], a[:NB_FOLDED])
-    on_trunk = robot.model.inertias[1].mass * (trunk.acceleration - gravity)
+    nb = BASE_COORDINATES[base]
+    trunk, rotation = _planar(q[:nb], v[:nb], a[:nb])
+    on_trunk, moment = _wrench(_inertia(robot, 1), rotation, trunk, gravity)
+    pairs = {leg: _links(robot, leg, half) for leg in legs}
     torques, feet = [], []
     for i, leg in enumerate(legs):
-        rows = slice(NB_FOLDED + i * len(JOINTS), NB_FOLDED + (i + 1) * len(JOINTS))
+        rows = slice(nb + i * len(JOINTS), nb + (i + 1) * len(JOINTS))
         joints = (q[rows], v[rows], a[rows])
-        force, torque, foot = _leg(robot, leg, trunk, joints, lam[:, i], gravity, lever)
-        on_trunk = on_trunk + 2.0 * force  # the leg and its mirror image
+        carried, torque, foot = _leg(
+            robot, leg, pairs[leg], (trunk, rotation), joints, lam[:, i], gravity, lever
+        )
+        on_trunk = on_trunk + 2.0 * carried[0]  # the leg and its mirror image
+        moment = moment + 2.0 * carried[1]
         torques.append(torque)
         feet.append(foot)
-    return ca.vertcat(on_trunk[0], on_trunk[2], *torques), feet
+    along = [on_trunk[0], on_trunk[2], moment[1]][:nb]
+    return ca.vertcat(*along, *torques), feet
 
 
-def _planar(q: ca.SX, v: ca.SX, a: ca.SX) -> FrameMotion:
-    """Motion of the trunk, held to the sagittal plane without rotation."""
+def _planar(q: ca.SX, v: ca.SX, a: ca.SX) -> tuple[FrameMotion, ca.SX]:
+    """Motion and rotation of the trunk, held to the sagittal plane."""
     position, velocity, acceleration = (ca.vertcat(x[0], 0.0, x[1]) for x in (q, v, a))
-    return FrameMotion(position, velocity, acceleration, ca.SX(3, 1), ca.SX(3, 1))
+    if q.numel() == 2:
+        still = ca.SX(3, 1)
+        return FrameMotion(position, velocity, acceleration, still, still), ca.SX.eye(3)
+    omega, alpha = (ca.vertcat(0.0, x[2], 0.0) for x in (v, a))
+    rotation = _rotation(np.array([0.0, 1.0, 0.0]), q[2])
+    return FrameMotion(position, velocity, acceleration, omega, alpha), rotation
 
 
 def _leg(
     robot: Robot,
     leg: str,
-    trunk: FrameMotion,
+    links: list[_Link],
+    trunk: tuple[FrameMotion, ca.SX],
     joints: tuple[ca.SX, ca.SX, ca.SX],
     lam: ca.SX,
     gravity: Array,
     lever: Array,
-) -> tuple[ca.SX, ca.SX, FrameMotion]:
-    """One leg: the force on it from the trunk (3), its motor torques (3), its foot's motion."""
-    links = _links(robot, leg)
-    motion, rotation = trunk, ca.SX.eye(3)
+) -> tuple[tuple[ca.SX, ca.SX], ca.SX, FrameMotion]:
+    """One leg: the force on it from the trunk and its moment about the trunk's origin (3 each),
+    its motor torques (3), its foot's motion."""
+    motion, rotation = trunk
     motions, axes, wrenches, rotors = [], [], [], []
     for link, q, v, a in zip(links, *map(ca.vertsplit, joints), strict=True):
         motion = _moved(motion, rotation @ ca.DM(link.translation))
@@ -116,7 +167,7 @@ def _leg(
         )
         motions.append(motion)
         axes.append(axis)
-        wrenches.append(_wrench(link, rotation, motion, gravity))
+        wrenches.append(_wrench(link.body, rotation, motion, gravity))
         rotors.append(link.armature * a)
 
     frame = robot.model.frames[robot.foot_ids[robot.legs.index(leg)]]
@@ -129,7 +180,8 @@ def _leg(
         moment = moment + ca.cross(point - joint.position, force) + wrench[1]
         force, point = force + wrench[0], joint.position
         torques.append(ca.dot(axis, moment))
-    return force, ca.vertcat(*torques[::-1]) + ca.vertcat(*rotors), foot
+    moment = moment + ca.cross(point - trunk[0].position, force)
+    return (force, moment), ca.vertcat(*torques[::-1]) + ca.vertcat(*rotors), foot
 
 
 def _moved(motion: FrameMotion, arm: ca.SX) -> FrameMotion:
@@ -146,14 +198,15 @@ def _moved(motion: FrameMotion, arm: ca.SX) -> FrameMotion:
 
 
 def _wrench(
-    link: _Link, rotation: ca.SX, motion: FrameMotion, gravity: Array
+    body: _Inertia, rotation: ca.SX, motion: FrameMotion, gravity: Array
 ) -> tuple[ca.SX, ca.SX]:
-    """Force and moment about the joint's origin that a link's own motion needs, in world axes."""
-    arm = rotation @ ca.DM(link.com)
-    force = link.mass * (_moved(motion, arm).acceleration - gravity)
-    inertia = rotation @ ca.DM(link.inertia) @ rotation.T
-    spin = inertia @ motion.alpha + ca.cross(motion.omega, inertia @ motion.omega)
-    return force, spin + ca.cross(arm, force)
+    """Force and moment about its frame's origin that a body's own motion needs, in world axes."""
+    first = rotation @ ca.DM(body.first)
+    second = rotation @ ca.DM(body.second) @ rotation.T
+    fall, omega, alpha = motion.acceleration - gravity, motion.omega, motion.alpha
+    force = body.mass * fall + ca.cross(alpha, first) + ca.cross(omega, ca.cross(omega, first))
+    moment = ca.cross(first, fall) + second @ alpha + ca.cross(omega, second @ omega)
+    return force, moment
 
 
 def _rotation(axis: Array, angle: ca.SX) -> ca.SX:
@@ -162,21 +215,35 @@ def _rotation(axis: Array, angle: ca.SX) -> ca.SX:
     return ca.SX.eye(3) + ca.sin(angle) * skew + (1.0 - ca.cos(angle)) * (skew @ skew)
 
 
-def _links(robot: Robot, leg: str) -> list[_Link]:
-    """The links of a leg from the trunk down."""
+def _links(robot: Robot, leg: str, half: Half) -> list[_Link]:
+    """The links of a leg from the trunk down, with their share of the pair's inertias."""
     links = []
-    for name in robot.spec.leg_joints(leg):
-        i = robot.model.getJointId(name)
-        placement, inertia = robot.model.jointPlacements[i], robot.model.inertias[i]
+    names = zip(robot.spec.leg_joints(leg), robot.spec.leg_joints(mirrored(leg)), strict=True)
+    for own, other in names:
+        i, j = robot.model.getJointId(own), robot.model.getJointId(other)
+        placement, image = robot.model.jointPlacements[i], _inertia(robot, j).mirrored()
+        armature = [float(robot.model.armature[robot.model.joints[k].idx_v]) for k in (i, j)]
+        sign = 1.0 if half == "mean" else -1.0
         links.append(
             _Link(
                 rotation=np.array(placement.rotation),
                 translation=np.array(placement.translation),
                 axis=np.array(robot.model.joints[i].createData().S).ravel()[3:],
-                mass=float(inertia.mass),
-                com=np.array(inertia.lever),
-                inertia=np.array(inertia.inertia),
-                armature=float(robot.model.armature[robot.model.joints[i].idx_v]),
+                body=_inertia(robot, i).mean(image if half == "mean" else image.minus()),
+                armature=0.5 * (armature[0] + sign * armature[1]),
             )
         )
     return links
+
+
+def mirrored(leg: str) -> str:
+    """The leg on the other side: FL and FR, RL and RR."""
+    return leg[:-1] + _MIRROR[leg[-1]]
+
+
+def _inertia(robot: Robot, joint: int) -> _Inertia:
+    """Inertia of the body that a joint of Pinocchio's model carries."""
+    body = robot.model.inertias[joint]
+    mass, com = float(body.mass), np.array(body.lever)
+    steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return _Inertia(mass, mass * com, np.array(body.inertia) + steiner)

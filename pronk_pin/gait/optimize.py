@@ -3,33 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from .._typing import Array
 from ..errors import GaitNotFound, InvalidInput
-from ..robot import NB
-from . import bezier
-from .collocation import PHASES, node_phases, transcribe
-from .folded_model import FoldedModel, fold
+from .checks import TOLERANCE, Audit
+from .collocation import node_phases, transcribe
+from .elastic import fights, remedies
+from .folded_model import FoldedModel
 from .gait import Gait, GaitPhase, Motion
-from .newton_euler import NB_FOLDED
-from .problem import GaitProblem
+from .guess import vertical_hop
+from .problem import ContactPhase, GaitProblem
 from .transcription import Transcription, Violation
-
-ORDERS = {"stance": 8, "flight": 11}
-"""Bezier orders: in flight the first that keeps the joints well within 1e-3 rad of the optimised
-motion (order 10 loses 1.2e-3 rad, order 11 4e-4, and beyond it the mesh is the limit); in stance,
-where order 6 would do for the joints (4e-4 rad), the first that keeps the feet on the ground
-within 0.01 mm."""
-
-TOLERANCE = 1e-8
-"""Largest violation of a constraint that passes, in the constraint's unit."""
+from .unfold import fitted, fold_problem, touchdown_impulse, unfolded
 
 _COLD: dict[str, Any] = {
     "print_time": False,
@@ -37,13 +30,14 @@ _COLD: dict[str, Any] = {
     "show_eval_warnings": False,
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
-    "ipopt.max_iter": 200,
+    "ipopt.max_iter": 300,
     "ipopt.tol": 1e-8,
     "ipopt.constr_viol_tol": 1e-9,
     # Limits are limits: IPOPT would by default relax each by 1e-8 of its size.
     "ipopt.bound_relax_factor": 0.0,
     # The crude guess is far off: a monotone barrier takes twice the iterations.
     "ipopt.mu_strategy": "adaptive",
+    "ipopt.adaptive_mu_globalization": "kkt-error",
     "ipopt.mu_init": 0.5,
 }
 _WARM = _COLD | {
@@ -55,6 +49,9 @@ _WARM = _COLD | {
     "ipopt.warm_start_slack_bound_frac": 1e-8,
     "ipopt.warm_start_mult_bound_push": 1e-8,
 }
+_COARSE = 4
+"""Mesh intervals of a phase where only the demands matter, not the accuracy."""
+
 _DERIVATIVES = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_hess_l"}
 """Option of CasADi's IPOPT that takes a derivative, and the function that is one."""
 
@@ -85,7 +82,8 @@ class GaitSolution:
         problem: What was asked.
         gait: The gait in its Bezier form.
         motions: The optimised motion of each phase at its nodes, midpoints included.
-        impulse: Touchdown impulses of the feet in the world frame [N s], shape (4, 3).
+        impulses: Touchdown impulses of the feet in the world frame [N s], shape (4, 3), by the
+            phase that they begin.
         cost: Value of eq. (6).
         violations: Worst violation of each named constraint.
         iterations: Iterations of the solver.
@@ -96,7 +94,7 @@ class GaitSolution:
     problem: GaitProblem
     gait: Gait
     motions: Mapping[str, Motion] = field(repr=False)
-    impulse: Array = field(repr=False)
+    impulses: Mapping[str, Array] = field(repr=False)
     cost: float
     violations: Mapping[str, Violation] = field(repr=False)
     iterations: int
@@ -104,47 +102,123 @@ class GaitSolution:
     state: SolverState = field(repr=False)
 
     @property
+    def values(self) -> dict[str, Array]:
+        """The unknowns of the transcription by name, each (nodes, rows)."""
+        return _program(self.problem).unpack(self.state.x)
+
+    def audit(self, *, refine: bool = True) -> Audit:
+        """Check the solution by other means than the solver's; takes a second or two.
+
+        Args:
+            refine: Find the order of convergence too, by solving on a mesh half as fine.
+        """
+        from .audit import audit  # which solves problems, and so builds on this module
+
+        return audit(self, refine=refine)
+
+    @property
     def model(self) -> FoldedModel:
         """The folded model it was found with."""
-        return fold(self.problem.robot, self.problem.contact)
+        return fold_problem(self.problem)
 
 
-def optimize_gait(problem: GaitProblem, *, initial: GaitSolution | None = None) -> GaitSolution:
+def optimize_gait(
+    problem: GaitProblem,
+    *,
+    initial: GaitSolution | SolverState | Mapping[str, Array] | None = None,
+    diagnose: bool = True,
+) -> GaitSolution:
     """Find the gait of least cost.
 
     Args:
         problem: What is asked.
-        initial: A solution of a like problem (another speed or apex) to start from; without it
-            the solver starts from a crude vertical hop.
+        initial: A solution of a like problem (another speed or apex) to start from, or its
+            solver's state, or a guess such as `vertical_hop` makes; without it the solver starts
+            from that crude hop.
+        diagnose: On failure, find out which demands fight; takes some seconds.
 
     Raises:
-        GaitNotFound: The solver failed; the error names the violated constraints.
-        InvalidInput: `initial` was found on another mesh.
+        GaitNotFound: The solver failed; the error names what fights and what to try.
+        InvalidInput: `initial` was found on another mesh or for another contact sequence.
     """
-    if initial is not None and initial.problem.intervals != problem.intervals:
-        raise InvalidInput(
-            f"the initial solution has {initial.problem.intervals} mesh intervals, the problem "
-            f"{problem.intervals}; give both the same"
-        )
+    if isinstance(initial, GaitSolution):
+        _check_alike(initial.problem, problem)
     found = _solve(problem, initial)
-    program, model = _program(problem), fold(problem.robot, problem.contact)
-    violations = program.violations(found.state.x, _parameters(problem))
+    program, p = _program(problem), _parameters(problem)
+    violations = program.violations(found.state.x, p)
     worst = {name: violation.value for name, violation in violations.items()}
     if not found.success or max(worst.values()) > TOLERANCE:
-        raise GaitNotFound(problem.speed, found.status, worst)
-    values = program.unpack(found.state.x)
-    motions = {name: _unfolded(model, values, name) for name in PHASES}
+        gives = _fights(problem) if diagnose else None
+        raise GaitNotFound(problem.speed, found.status, worst, gives, remedies(gives))
+    return _solution(problem, found.state, found)
+
+
+def _solution(problem: GaitProblem, state: SolverState, found: _Found) -> GaitSolution:
+    program, model = _program(problem), fold_problem(problem)
+    values = program.unpack(state.x)
+    motions = {phase.name: unfolded(model, values, phase) for phase in problem.sequence}
+    impulses = {
+        phase.name: touchdown_impulse(problem, index, motions, values)
+        for index, phase in enumerate(problem.sequence)
+        if problem.landing(index)
+    }
+    phases = [fitted(problem, phase, motions[phase.name], values) for phase in problem.sequence]
     return GaitSolution(
         problem=problem,
-        gait=_gait(problem, motions),
+        gait=Gait(problem.robot.name, problem.speed, problem.apex, tuple(phases)),
         motions=motions,
-        impulse=model.unfold_forces(values["impulse"][0]),
+        impulses=impulses,
         cost=found.cost,
-        violations=violations,
+        violations=program.violations(state.x, _parameters(problem)),
         iterations=found.iterations,
         solve_time=found.solve_time,
-        state=found.state,
+        state=state,
     )
+
+
+def fit_phase(solution: GaitSolution, phase: ContactPhase) -> GaitPhase:
+    """The Bezier form of a phase of a solution, with the order that `phase` asks for."""
+    return fitted(solution.problem, phase, solution.motions[phase.name], solution.values)
+
+
+def resampled(solution: GaitSolution, intervals: Sequence[int]) -> SolverState:
+    """A solution on another mesh, for a warm start there: the unknowns and their bounds'
+    multipliers interpolated, the constraints' multipliers left to the solver."""
+    problem, before = solution.problem, _program(solution.problem)
+    program = _program(problem.remeshed(intervals))
+
+    def moved(vector: Array) -> Array:
+        values = before.unpack(vector)
+        for phase, n in zip(problem.sequence, intervals, strict=True):
+            old, new = node_phases(phase.intervals), node_phases(n)
+            for key in ("q", "v", "a", "tau", "lam"):
+                name = f"{phase.name}.{key}"
+                if name in values:
+                    values[name] = np.asarray(CubicSpline(old, values[name])(new))
+        return program.pack(values)
+
+    return SolverState(moved(solution.state.x), moved(solution.state.lam_x), np.zeros(program.size))
+
+
+def _check_alike(initial: GaitProblem, problem: GaitProblem) -> None:
+    if initial.intervals != problem.intervals:
+        raise InvalidInput(
+            f"the initial solution has {initial.intervals} mesh intervals, the problem "
+            f"{problem.intervals}; give both the same"
+        )
+    phases = [[(p.name, p.stands) for p in each.sequence] for each in (initial, problem)]
+    if phases[0] != phases[1] or initial.base != problem.base:
+        raise InvalidInput(
+            "the initial solution has another contact sequence or base mode than the problem; "
+            "give both the same"
+        )
+
+
+def _fights(problem: GaitProblem) -> dict[str, float] | None:
+    """Which demands have to give way; a coarse mesh is enough to tell."""
+    coarse = problem.remeshed([_COARSE] * len(problem.sequence))
+    program = _program(coarse)
+    return fights(program, program.pack(vertical_hop(coarse)), _parameters(problem))
 
 
 class _Found(NamedTuple):
@@ -158,13 +232,20 @@ class _Found(NamedTuple):
     solve_time: float
 
 
-def _solve(problem: GaitProblem, initial: GaitSolution | None) -> _Found:
+def _solve(
+    problem: GaitProblem, initial: GaitSolution | SolverState | Mapping[str, Array] | None
+) -> _Found:
     program = _program(problem)
-    if initial is None:
-        start = {"x0": program.pack(vertical_hop(problem))}
+    state = initial.state if isinstance(initial, GaitSolution) else initial
+    warm = isinstance(state, SolverState)
+    if isinstance(state, SolverState):
+        start = state.as_start()
+        if len(state.x) != len(program.bounds["lbx"]) or len(state.lam_g) != program.size:
+            raise InvalidInput("the solver's state belongs to another kind of gait problem")
     else:
-        start = initial.state.as_start()
-    solver = _solver(_structure(problem), warm=initial is not None)
+        guess = vertical_hop(problem) if state is None else state
+        start = {"x0": program.pack(guess)}
+    solver = _solver(_structure(problem), warm=warm)
     clock = time.perf_counter()
     result = solver(**start, **program.bounds, p=_parameters(problem))
     solve_time = time.perf_counter() - clock
@@ -205,80 +286,3 @@ def _solver(structure: GaitProblem, *, warm: bool) -> ca.Function:
     cold = _solver(structure, warm=False)
     derivatives = {option: cold.get_function(name) for option, name in _DERIVATIVES.items()}
     return ca.nlpsol("solver", "ipopt", nlp, _WARM | derivatives)
-
-
-def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
-    """A crude first guess: the trunk hops on parabolas, the legs keep the standing posture.
-
-    Returns:
-        The unknowns of the transcription, each (nodes, rows).
-    """
-    robot, model = problem.robot, fold(problem.robot, problem.contact)
-    legs, standing = len(model.legs), robot.standing[NB + 1 :][model.joint_rows()]
-    stance, flight = 0.5 * sum(problem.stance), problem.flight[0]
-    rise = robot.gravity * flight**2 / 8
-    dip = robot.gravity * flight * stance / 8  # as deep as the speed at take-off asks
-    values, start = {}, 0.0
-    for name, duration, n in zip(PHASES, (stance, flight), problem.intervals, strict=True):
-        s = node_phases(n)
-        height = rise if name == "flight" else -dip
-        z = problem.apex - rise + height * 4 * s * (1 - s)
-        x = start + problem.speed * duration * s
-        q = np.column_stack([x, z, np.tile(standing, (len(s), 1))])
-        v = np.gradient(q, s * duration, axis=0)
-        values[f"{name}.q"], values[f"{name}.v"] = q, v
-        values[f"{name}.a"] = np.gradient(v, s * duration, axis=0)
-        values[f"{name}.tau"] = np.zeros((len(s), q.shape[1] - NB_FOLDED))
-        values[f"{name}.duration"] = np.array([duration])
-        start += problem.speed * duration
-    push = robot.mass * robot.gravity * (stance + flight) / stance / len(robot.legs)
-    values["stance.lam"] = np.tile([0.0, 0.0, push], (2 * problem.intervals[0] + 1, legs))
-    values["impulse"] = np.zeros(3 * legs)
-    return values
-
-
-def _unfolded(model: FoldedModel, values: dict[str, Array], name: str) -> Motion:
-    """The whole robot's motion at the nodes of a phase."""
-    q, v, a, tau = (values[f"{name}.{key}"] for key in ("q", "v", "a", "tau"))
-    n, robot = len(q), model.robot
-    lam = values.get(f"{name}.lam", np.zeros((n, 3 * len(model.legs))))
-
-    def rates(folded: Array) -> Array:
-        whole = np.zeros((n, robot.nv))
-        whole[:, [0, 2]] = folded[:, :NB_FOLDED]
-        whole[:, robot.nv - robot.nu :] = model.unfold_joints(folded[:, NB_FOLDED:])
-        return whole
-
-    position = np.stack([q[:, 0], np.zeros(n), q[:, 1]], axis=-1)
-    return Motion(
-        t=float(values[f"{name}.duration"][0, 0]) * node_phases(n // 2),
-        q=robot.q_from_base(position, model.unfold_joints(q[:, NB_FOLDED:])),
-        v=rates(v),
-        a=rates(a),
-        tau=model.unfold_joints(tau),
-        lam=model.unfold_forces(lam),
-    )
-
-
-def _gait(problem: GaitProblem, motions: Mapping[str, Motion]) -> Gait:
-    """The Bezier form of all phases."""
-    feet = {"stance": problem.robot.legs, "flight": ()}
-    phases = [_fitted(name, feet[name], motions[name], ORDERS[name]) for name in PHASES]
-    return Gait(problem.robot.name, problem.speed, problem.apex, tuple(phases))
-
-
-def _fitted(name: str, feet: tuple[str, ...], motion: Motion, order: int) -> GaitPhase:
-    """Bezier form of a phase; the motion's ends are met exactly, in value and rate."""
-    duration = float(motion.t[-1])
-    s, n = motion.t / duration, len(motion.t)
-    base = np.column_stack([motion.q[:, 0], motion.q[:, 2], np.zeros(n)])
-    base_rates = np.column_stack([motion.v[:, 0], motion.v[:, 2], np.zeros(n)])
-    return GaitPhase(
-        name=name,
-        feet=feet,
-        duration=duration,
-        joints=bezier.fit(s, motion.q[:, 7:], order, rates=motion.v[:, 6:] * duration, pinned=2),
-        base=bezier.fit(s, base, order, rates=base_rates * duration, pinned=2),
-        tau=bezier.fit(s, motion.tau, order),
-        lam=bezier.fit(s, motion.lam, order),
-    )

@@ -4,114 +4,160 @@ The collocation asks for the equations of motion at its nodes only. Here the who
 its joints, follows the same torques through an adaptive integrator; how far it ends up from the
 optimised motion is the error that the mesh made.
 
-The trunk is held by a guide to the sagittal plane without rotation, so the coordinates are x, z
-and the joints, and the guide takes the rows of y and the rotations.
+The trunk is held by a guide to the sagittal plane, without rotation or free to pitch, so the
+coordinates are x, z, perhaps pitch, and the joints; the guide takes the other rows.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-from .._typing import Array
+from .._typing import Array, IntArray
 from ..dynamics import Contact, contact_bias, contact_jacobian
 from ..kinematics import foot_positions
 from ..robot import NB, Robot
 from .gait import Motion
+from .problem import Base
 
 _TOLERANCE = 1e-10
+
+
+class Worst(NamedTuple):
+    """A largest value, and when it is met."""
+
+    value: float
+    time: float
+    """From the beginning of the phase [s]."""
 
 
 class Drift(NamedTuple):
     """Largest distances between the re-integrated motion and the optimised one."""
 
-    joints: float
-    """[rad]"""
-    feet: float
-    """[m]"""
+    joints: Worst
+    """Of the joints, and the pitch [rad]."""
+    feet: Worst
+    """Of the feet's centres [m]."""
 
 
-def guided_rows(robot: Robot) -> Array:
-    """Indices of the velocities that the guide leaves free: x, z and the joints.
+def guided_rows(robot: Robot, base: Base = "locked") -> IntArray:
+    """Indices of the velocities that the guide leaves free: x, z, perhaps pitch, and the joints.
 
-    The trunk does not turn, so that its body axes are the world's.
+    x and z are those of the trunk, which stay in the sagittal plane.
     """
-    return np.array([0, 2, *range(NB, robot.nv)])
+    free = (0, 2, 4) if base == "sagittal" else (0, 2)
+    return np.array([*free, *range(NB, robot.nv)], dtype=np.intp)
 
 
 def forward_dynamics(
-    robot: Robot, q: Array, v: Array, tau: Array, *, contact: Contact | None = None
+    robot: Robot,
+    q: Array,
+    v: Array,
+    tau: Array,
+    *,
+    contact: Contact = "rolling",
+    feet: Sequence[str] = (),
+    base: Base = "locked",
 ) -> Array:
-    """Acceleration of the guided robot, all feet standing or none: eq. (5) or (2).
+    """Acceleration of the guided robot: eq. (5) of the feet that stand, or (2) without any.
 
     Args:
         robot: The robot.
         q: Configuration, shape (19,).
         v: Velocity, shape (18,).
         tau: Motor torques [N m], shape (12,).
-        contact: How all the feet stand on the ground; None in flight.
+        contact: How feet stand on the ground.
+        feet: The legs whose feet stand.
+        base: What the guide leaves the trunk.
 
     Returns:
         Acceleration, shape (18,), zero where the guide holds the trunk.
     """
-    rows = guided_rows(robot)
-    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14, 14)
+    rows = guided_rows(robot, base)
+    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14 or 15, ...)
     force = np.concatenate([np.zeros(NB), tau])
     force = (force - pin.nonLinearEffects(robot.model, robot.data, q, v))[rows]
     a = np.zeros(robot.nv)
-    if contact is None:
+    if not feet:
         a[rows] = np.linalg.solve(mass, force)
         return a
-    jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]  # (12, 14)
-    bias = contact_bias(robot, q, v, contact=contact)
+    jacobian = contact_jacobian(robot, q, feet=feet, contact=contact)[:, rows]
+    bias = contact_bias(robot, q, v, feet=feet, contact=contact)
     corner = np.zeros((len(jacobian), len(jacobian)))
     kkt = np.block([[mass, -jacobian.T], [jacobian, corner]])
     a[rows] = np.linalg.solve(kkt, np.concatenate([force, -bias]))[: len(rows)]
     return a
 
 
-def drift(robot: Robot, motion: Motion, *, contact: Contact | None) -> Drift:
+def drift(
+    robot: Robot,
+    motion: Motion,
+    *,
+    contact: Contact = "rolling",
+    feet: Sequence[str] = (),
+    base: Base = "locked",
+) -> Drift:
     """Re-integrate a phase under its optimised torques and compare at every mesh point.
 
     Args:
         robot: The robot.
         motion: The optimised motion at its nodes, midpoints included.
-        contact: How all the feet stand on the ground; None in flight.
+        contact: How feet stand on the ground.
+        feet: The legs whose feet stand.
+        base: What the guide leaves the trunk.
     """
-    rows = guided_rows(robot)
+    rows = guided_rows(robot, base)
     n = len(rows)
-    position = np.concatenate([motion.q[:, [0, 2]], motion.q[:, NB + 1 :]], axis=1)  # (nodes, 14)
+    position = _coordinates(motion.q, n - robot.nu)  # (nodes, n)
     state = np.concatenate([position[0], motion.v[0, rows]])
-    joints = feet = 0.0
+    joints, moved = Worst(0.0, 0.0), Worst(0.0, 0.0)
     for k in range(0, len(motion.t) - 1, 2):
         times, torques = motion.t[k : k + 3], motion.tau[k : k + 3]
 
         def rate(t: float, y: Array, times: Array = times, torques: Array = torques) -> Array:
-            v = np.zeros(robot.nv)
+            q, v = _configuration(robot, y[:n]), np.zeros(robot.nv)
             v[rows] = y[n:]
             tau = _quadratic(t, times, torques)
-            a = forward_dynamics(robot, _configuration(robot, y[:n]), v, tau, contact=contact)
-            return np.concatenate([y[n:], a[rows]])
+            a = forward_dynamics(robot, q, v, tau, contact=contact, feet=feet, base=base)
+            return np.concatenate([_rates(y, n, robot.nu), a[rows]])
 
         result = solve_ivp(
             rate, (times[0], times[2]), state, method="DOP853", rtol=_TOLERANCE, atol=_TOLERANCE
         )
         state = np.asarray(result.y[:, -1])
         reached, wanted = state[:n], position[k + 2]
-        joints = max(joints, float(np.max(np.abs(reached - wanted)[2:])))
+        joints = max(joints, Worst(float(np.max(np.abs(reached - wanted)[2:])), times[2]))
         apart = foot_positions(robot, _configuration(robot, reached)) - foot_positions(
             robot, _configuration(robot, wanted)
         )
-        feet = max(feet, float(np.max(np.linalg.norm(apart, axis=-1))))
-    return Drift(joints, feet)
+        moved = max(moved, Worst(float(np.max(np.linalg.norm(apart, axis=-1))), times[2]))
+    return Drift(joints, moved)
+
+
+def _coordinates(q: Array, nb: int) -> Array:
+    """x, z, perhaps pitch, and the joints of configurations, shape (n, nb + 12)."""
+    pitch = 2.0 * np.arctan2(q[:, 4], q[:, 6])[:, None]
+    return np.concatenate([q[:, [0, 2]], pitch[:, : nb - 2], q[:, NB + 1 :]], axis=1)
+
+
+def _rates(y: Array, n: int, nl: int) -> Array:
+    """Rates of the coordinates: x and z turn from the trunk's axes into the world's."""
+    rates = y[n:].copy()
+    if n - nl > 2:
+        cos, sin = np.cos(y[2]), np.sin(y[2])
+        rates[:2] = cos * y[n] + sin * y[n + 1], -sin * y[n] + cos * y[n + 1]
+    return rates
 
 
 def _configuration(robot: Robot, y: Array) -> Array:
-    """q of the guided robot from x, z and the joints, shape (19,)."""
-    return robot.q_from_base(np.array([y[0], 0.0, y[1]]), y[2:])
+    """q of the guided robot from x, z, perhaps pitch, and the joints, shape (19,)."""
+    nb = len(y) - robot.nu
+    pitch = float(y[2]) if nb > 2 else 0.0
+    return robot.q_from_base(np.array([y[0], 0.0, y[1]]), y[nb:], pitch=pitch)
 
 
 def _quadratic(t: float, times: Array, values: Array) -> Array:

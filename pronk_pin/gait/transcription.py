@@ -14,6 +14,33 @@ import casadi as ca
 import numpy as np
 
 from .._typing import Array
+from ..errors import InvalidInput
+
+UNITS = {
+    "average speed": "m",
+    "apex height": "m",
+    "dynamics": "N or N m",
+    "collocation": "m or rad",
+    "contact height": "m",
+    "contact acceleration": "m/s^2",
+    "touchdown impact": "N s",
+    "touchdown contact": "m/s",
+    "foot clearance": "m",
+    "phase continuity": "m or rad",
+    "periodicity": "m or rad",
+    "stride duration": "s",
+    "phase durations": "s",
+    "configuration limits": "rad",
+    "hip limit": "rad",
+    "pitch limit": "rad",
+    "trunk height": "m",
+    "velocity limits": "rad/s",
+    "torque limits": "N m",
+    "unilateral contact": "N",
+    "friction cone": "N",
+    "impulse cone": "N s",
+}
+"""Units of the constraints; where a constraint holds positions and velocities, the former's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +78,7 @@ class Violation(NamedTuple):
     value: float
     """In the constraint's unit; 0 where it is met."""
     where: str
-    """Phase and node; "" where it is met."""
+    """Phase and node where it is largest, or, where it is met, tightest; "" if nowhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +113,17 @@ class Transcription:
         return cls(unknowns, parameters, cost, constraints, evaluate)
 
     @property
+    def names(self) -> frozenset[str]:
+        """Names of all constraints and bounds."""
+        limits = {name for unknown in self.unknowns.values() for name in unknown.limits if name}
+        return frozenset(limits | {constraint.name for constraint in self.constraints})
+
+    @property
+    def size(self) -> int:
+        """Number of constraints."""
+        return sum(int(constraint.expression.numel()) for constraint in self.constraints)
+
+    @property
     def nlp(self) -> dict[str, Any]:
         """The program as `casadi.nlpsol` takes it."""
         x, g = _stacked_unknowns(self.unknowns), _stacked_constraints(self.constraints)
@@ -104,7 +142,18 @@ class Transcription:
         }
 
     def pack(self, values: Mapping[str, Array]) -> Array:
-        """x from the blocks' values, each (nodes, rows)."""
+        """x from the blocks' values, each (nodes, rows).
+
+        Raises:
+            InvalidInput: A block is missing, or has another shape.
+        """
+        for name, unknown in self.unknowns.items():
+            size = unknown.symbol.numel()
+            if name not in values or np.size(values[name]) != size:
+                raise InvalidInput(
+                    f"the guess for {name} is not {size} numbers; take `vertical_hop` of this "
+                    "problem and change its values"
+                )
         return np.concatenate([np.ravel(values[name]) for name in self.unknowns])
 
     def unpack(self, x: Array) -> dict[str, Array]:
@@ -118,12 +167,11 @@ class Transcription:
 
     def violations(self, x: Array, p: Array) -> dict[str, Violation]:
         """The worst violation of each named constraint, bounds included."""
-        worst: dict[str, Violation] = {}
+        found: dict[str, Violation] = {}
 
         def note(name: str, excess: float, where: str) -> None:
-            known = worst.setdefault(name, Violation(0.0, ""))
-            if excess > known.value:
-                worst[name] = Violation(excess, where)
+            if name not in found or excess > found[name].value:
+                found[name] = Violation(excess, where)
 
         g, start = np.array(self.evaluate(x, p)).ravel(), 0
         for constraint in self.constraints:
@@ -139,7 +187,9 @@ class Transcription:
                 if limit:
                     where = f"{unknown.where}, node {nodes[row]}"
                     note(limit, float(excess[nodes[row], row]), where)
-        return worst
+        return {
+            name: Violation(max(0.0, worst.value), worst.where) for name, worst in found.items()
+        }
 
 
 def _stacked_unknowns(unknowns: Mapping[str, Unknown]) -> ca.SX:

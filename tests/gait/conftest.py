@@ -10,7 +10,8 @@ from pronk_pin.robot import Robot
 
 @pytest.fixture(scope="session")
 def library() -> GaitLibrary:
-    return load_library("a1")
+    """The 14 gaits of the paper's apex."""
+    return load_library("a1").at_apex(0.34)
 
 
 @pytest.fixture(scope="session")

@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pronk_pin.gait import GaitProblem, GaitSolution
-from pronk_pin.gait.collocation import UNITS, _apex, node_phases, transcribe
-from pronk_pin.gait.optimize import vertical_hop
+from pronk_pin.gait import GaitProblem, GaitSolution, vertical_hop
+from pronk_pin.gait.collocation import _apex, node_phases, transcribe
+from pronk_pin.gait.transcription import UNITS
 from pronk_pin.robot import Robot
 
 
@@ -29,7 +29,7 @@ def test_apex_of_a_parabola_is_exact(peak: float) -> None:
 
 
 def test_every_constraint_has_a_unit(solution: GaitSolution) -> None:
-    assert set(solution.violations) == set(UNITS)
+    assert set(solution.violations) == set(UNITS) - {"pitch limit"}  # the trunk is locked
 
 
 def test_a_violation_is_found_under_its_name(robot: Robot, solution: GaitSolution) -> None:

@@ -9,15 +9,14 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin.gait.folded_model import FoldedModel, fold
-from pronk_pin.gait.newton_euler import NB_FOLDED
+from pronk_pin.gait.gait import planar_state
 from pronk_pin.robot import Robot
 
-KEPT = [0, 2, 6, 7, 8, 12, 13, 14]
-"""Rows of the whole robot that the folded model keeps: x, z, FL, RL."""
 
-
-@pytest.fixture(params=["rolling", "point", "rolling with rotors"], scope="module")
+@pytest.fixture(params=["rolling", "point", "rolling with rotors", "pitching"], scope="module")
 def folded(robot: Robot, request: pytest.FixtureRequest) -> FoldedModel:
+    if request.param == "pitching":
+        return fold(robot, "rolling", "sagittal")
     if request.param != "rolling with rotors":
         return fold(robot, request.param)
     model = robot.model.copy()
@@ -25,17 +24,27 @@ def folded(robot: Robot, request: pytest.FixtureRequest) -> FoldedModel:
     return fold(dataclasses.replace(robot, model=model), "rolling")
 
 
-def expansion(folded: FoldedModel) -> np.ndarray:
-    """Matrix from folded to whole-robot velocities, shape (18, 8)."""
-    matrix = np.zeros((folded.robot.nv, folded.nq))
-    matrix[0, 0] = matrix[2, 1] = 1.0
-    matrix[6:, NB_FOLDED:] = folded.unfold_joints(np.eye(folded.nl)).T
-    return matrix
+def states(folded: FoldedModel, q, v, a):
+    """Whole-robot q, v and a of folded ones, and the matrix from folded to whole velocities."""
+
+    def parts(x):
+        base = np.zeros((1, 3))
+        base[0, : folded.nb] = x[: folded.nb]
+        return base, folded.unfold_joints(x[folded.nb :])[None]
+
+    whole = [x[0] for x in planar_state(folded.robot, parts(q), parts(v), parts(a))]
+    grow = [
+        planar_state(folded.robot, parts(q), parts(unit), parts(np.zeros(folded.nq)))[1][0]
+        for unit in np.eye(folded.nq)
+    ]
+    return *whole, np.stack(grow, axis=1)  # (18, nq)
 
 
-def unfold(folded: FoldedModel, q: np.ndarray) -> np.ndarray:
-    position = np.array([q[0], 0.0, q[1]])
-    return folded.robot.q_from_base(position, folded.unfold_joints(q[NB_FOLDED:]))
+def kept(folded: FoldedModel, grow: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """What forces of the whole robot do along the folded coordinates, of the kept legs alone."""
+    share = np.ones(folded.nq)
+    share[folded.nb :] = 0.5  # a folded joint moves two of the robot's
+    return share.reshape(-1, *[1] * (forces.ndim - 1)) * (grow.T @ forces)
 
 
 def lowest_points(folded: FoldedModel, q, v, a):
@@ -59,38 +68,39 @@ def lowest_points(folded: FoldedModel, q, v, a):
 @pytest.mark.parametrize("seed", range(5))
 def test_dynamics_equal_pinocchio_at_symmetric_states(folded: FoldedModel, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    robot, grow = folded.robot, expansion(folded)
+    robot = folded.robot
     q, v, a = rng.normal(size=(3, folded.nq)) * [[1.0], [10.0], [100.0]]
     lam = rng.normal(size=6) * 100.0
-    whole = unfold(folded, q)
-    tau = pin.rnea(robot.model, robot.model.createData(), whole, grow @ v, grow @ a)
-    *_, jacobian = lowest_points(folded, whole, grow @ v, grow @ a)
+    *whole, grow = states(folded, q, v, a)
+    tau = pin.rnea(robot.model, robot.model.createData(), *whole)
+    *_, jacobian = lowest_points(folded, *whole)
     tau -= np.einsum("fcj,fc->j", jacobian, folded.unfold_forces(lam))
     mine = np.array(folded.dynamics(q, v, a, lam)).ravel()
-    np.testing.assert_allclose(mine, tau[KEPT], rtol=1e-12, atol=1e-11)
+    np.testing.assert_allclose(mine, kept(folded, grow, tau), rtol=1e-11, atol=1e-10)
 
 
 def test_mass_matrix_and_bias_equal_pinocchio(folded: FoldedModel) -> None:
     rng = np.random.default_rng(7)
-    robot, grow = folded.robot, expansion(folded)
+    robot, data, zero = folded.robot, folded.robot.model.createData(), np.zeros(folded.nq)
     q, v = rng.normal(size=(2, folded.nq))
-    whole, data, zero = unfold(folded, q), robot.model.createData(), np.zeros(folded.nq)
+    whole, rate, bias_only, grow = states(folded, q, v, zero)
     mass = np.stack(
         [np.array(folded.impact(q, column, np.zeros(6))).ravel() for column in np.eye(folded.nq)],
         axis=1,
     )
-    np.testing.assert_allclose(mass, (pin.crba(robot.model, data, whole) @ grow)[KEPT], atol=1e-13)
+    expected = kept(folded, grow, pin.crba(robot.model, data, whole) @ grow)
+    np.testing.assert_allclose(mass, expected, atol=1e-13)
     bias = np.array(folded.dynamics(q, v, zero, np.zeros(6))).ravel()
-    expected = pin.nonLinearEffects(robot.model, data, whole, grow @ v)[KEPT]
+    expected = kept(folded, grow, pin.rnea(robot.model, data, whole, rate, bias_only))
     np.testing.assert_allclose(bias, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_feet_equal_pinocchio(folded: FoldedModel, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    grow = expansion(folded)
     q, v, a = rng.normal(size=(3, folded.nq))
-    *expected, _ = lowest_points(folded, unfold(folded, q), grow @ v, grow @ a)
+    *whole, _ = states(folded, q, v, a)
+    *expected, _ = lowest_points(folded, *whole)
     for mine, pinocchio in zip(folded.feet(q, v, a), expected, strict=True):
         np.testing.assert_allclose(np.array(mine).T, pinocchio[[0, 2]], atol=1e-12)
 

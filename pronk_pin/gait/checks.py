@@ -1,0 +1,159 @@
+"""What an audit says: named checks with their worst values, places and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from .transcription import UNITS
+
+TOLERANCE = 1e-8
+"""Largest violation of a constraint that passes, in the constraint's unit."""
+
+
+class Limit(NamedTuple):
+    """What a check measures, and what passes; None where the value only informs."""
+
+    unit: str
+    most: float | None = None
+    least: float | None = None
+
+
+CHECKS: Mapping[str, Limit] = {
+    "18-DoF residual": Limit("N or N m", 1e-8),
+    "guide": Limit("N or N m"),
+    "mirror symmetry": Limit("m", 1e-12),
+    "apex error": Limit("m", 1e-4),
+    "contact height drift": Limit("m", 2e-6),
+    "contact slip": Limit("m/s", 1e-4),
+    "stance drift": Limit("rad", 2e-5),
+    "stance foot drift": Limit("m", 2e-6),
+    "flight drift": Limit("rad", 1e-3),
+    "flight foot drift": Limit("m", 1e-4),
+    "convergence order": Limit("", least=3.0),
+    "bezier position": Limit("rad", 1e-3),
+    "bezier velocity": Limit("rad/s"),
+    "bezier torque": Limit("N m"),
+    "torque use": Limit("of limit", 1.0),
+    "velocity use": Limit("of limit", 1.0),
+    "friction use": Limit("of limit", 1.0),
+    "ground force": Limit("N"),
+}
+"""The independent checks: unit, and what passes."""
+
+_ROUND_OFF = 1e-9
+"""A limit that a gait uses in full is not exceeded by round-off [of it]."""
+
+_VIOLATION = "violation: "
+
+
+@dataclass(frozen=True)
+class Check:
+    """One checked claim.
+
+    Attributes:
+        name: What was checked.
+        value: The worst value found.
+        where: Where it was found.
+        limit: Its unit, and what passes.
+    """
+
+    name: str
+    value: float
+    where: str
+    limit: Limit
+
+    @classmethod
+    def of(cls, name: str, value: float, where: str = "") -> Check:
+        """An independent check, by its name in `CHECKS`."""
+        return cls(name, value, where, CHECKS[name])
+
+    @classmethod
+    def of_constraint(cls, name: str, violation: float, where: str = "") -> Check:
+        """A constraint of the gait problem with its worst violation."""
+        return cls(name, violation, where, Limit(UNITS[name], TOLERANCE))
+
+    @property
+    def unit(self) -> str:
+        """Unit of the value."""
+        return self.limit.unit
+
+    @property
+    def passed(self) -> bool:
+        """Whether the value is within its limit."""
+        most, least = self.limit.most, self.limit.least
+        if most is not None and not self.value <= most * (1.0 + _ROUND_OFF):
+            return False
+        return least is None or self.value >= least
+
+    def line(self) -> str:
+        """The check as a line of a table."""
+        most, least = self.limit.most, self.limit.least
+        limit = f"<= {most:.0e}" if most is not None else f">= {least:g}" if least else ""
+        note = self.where if self.passed else f"{self.where}  FAILED"
+        return f"{self.name:<24}{self.value:>10.1e}  {self.unit:<12}{limit:>9}  {note}".rstrip()
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What was found about one gait.
+
+    Attributes:
+        speed: Speed of the gait [m/s].
+        constraints: The named constraints of the problem with their worst violations.
+        checks: The independent checks.
+    """
+
+    speed: float
+    constraints: tuple[Check, ...]
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether everything is within its limit."""
+        return not self.failures
+
+    @property
+    def worst_violation(self) -> Check:
+        """The constraint that is violated most."""
+        return max(self.constraints, key=lambda check: check.value)
+
+    @property
+    def failures(self) -> tuple[Check, ...]:
+        """What is not within its limit."""
+        return tuple(check for check in (*self.constraints, *self.checks) if not check.passed)
+
+    def __getitem__(self, name: str) -> Check:
+        """The independent check of that name."""
+        return next(check for check in self.checks if check.name == name)
+
+    def as_json(self) -> dict[str, Any]:
+        """Values and places by name, as a file keeps them; constraints as "violation: name"."""
+        named = [(_VIOLATION + check.name, check) for check in self.constraints]
+        named += [(check.name, check) for check in self.checks]
+        return {name: [check.value, check.where] for name, check in named}
+
+    @classmethod
+    def from_json(cls, speed: float, entries: Mapping[str, Any]) -> Audit:
+        """The audit that a file keeps; what passes is decided anew.
+
+        Raises:
+            KeyError: A check that this version does not know, or one that is missing.
+        """
+        constraints, checks = [], []
+        for name, (value, where) in entries.items():
+            if name.startswith(_VIOLATION):
+                name = name.removeprefix(_VIOLATION)
+                constraints.append(Check.of_constraint(name, float(value), str(where)))
+            else:
+                checks.append(Check.of(name, float(value), str(where)))
+        missing = set(CHECKS) - {check.name for check in checks}
+        if missing or not constraints:
+            raise KeyError(f"audit without {', '.join(sorted(missing)) or 'constraints'}")
+        return cls(speed, tuple(constraints), tuple(checks))
+
+    def table(self) -> str:
+        """Everything that was found, one line a check."""
+        header = f"{'check':<24}{'worst':>10}  {'unit':<12}{'passes':>9}  where"
+        return "\n".join([header, *(c.line() for c in (*self.constraints, *self.checks))])

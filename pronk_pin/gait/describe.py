@@ -1,0 +1,80 @@
+"""A gait library in words: one line for each gait, or one gait in detail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..errors import InvalidInput
+from .library import GaitLibrary
+
+
+def describe_library(library: GaitLibrary) -> str:
+    """A table of the gaits and of what their audit found.
+
+    Raises:
+        InvalidInput: The library has no audit.
+    """
+    if not library.audit:
+        raise InvalidInput("this gait library has no audit; build it with 'pronk-pin gaits build'")
+    lines = [
+        "  speed   apex  stride  violation  18-DoF res.  stance drift      foot  flight drift"
+        "  order    Bezier  torque  velocity  friction",
+        "    m/s      m       s     (worst)       N, N m           rad         m           rad"
+        "              rad  of lim.   of lim.   of lim.",
+    ]
+    for gait, found in zip(library.gaits, library.audit, strict=True):
+        lines.append(
+            f"{gait.speed:>+7.2f}{gait.apex:>7.3f}{gait.duration:>8.3f}"
+            f"{found.worst_violation.value:>11.1e}{found['18-DoF residual'].value:>13.1e}"
+            f"{found['stance drift'].value:>14.1e}{found['stance foot drift'].value:>10.1e}"
+            f"{found['flight drift'].value:>14.1e}{found['convergence order'].value:>7.1f}"
+            f"{found['bezier position'].value:>10.1e}{found['torque use'].value:>8.0%}"
+            f"{found['velocity use'].value:>10.0%}{found['friction use'].value:>10.0%}"
+            + ("" if found.passed else "  FAILED: " + ", ".join(c.name for c in found.failures))
+        )
+    times = library.metadata.get("solve_time", [])
+    if times:
+        lines += ["", f"{len(times)} gaits, solved in {sum(times):.1f} s"]
+    return "\n".join(lines)
+
+
+def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None) -> str:
+    """One gait in detail: its form, and its audit where it is one of the library's, or what its
+    interpolation leaves out where it is not.
+
+    Raises:
+        SpeedOutOfRange: The library does not cover the speed.
+        ApexOutOfRange: The library does not cover the apex.
+    """
+    gait = library.at(speed, apex)
+    kind = library.metadata.get("gait", "pronk")
+    lines = [
+        f"{gait.robot}, {kind}, {library.base} base, {gait.speed:+.3g} m/s, "
+        f"apex {gait.apex:.3g} m, {1.0 / gait.duration:.2f} strides/s"
+    ]
+    orders = library.metadata.get("bezier_orders", {})
+    for phase in gait.phases:
+        feet = ", ".join(phase.feet) or "no feet"
+        order = phase.joints.shape[-1] - 1
+        lines.append(f"  {phase.name}: {phase.duration:.3f} s on {feet}; Bezier order {order}")
+        if phase.name in orders:
+            lines.append(f"    {_why(orders[phase.name], order)}")
+    residual = library.residual(speed, apex)
+    lines.append(
+        f"  in its Bezier form the equations of motion lack {residual.force:.2g} N, "
+        f"{residual.moment:.2g} N m; feet {1e3 * residual.height:.2g} mm off the ground"
+    )
+    k = next((i for i, other in enumerate(library.gaits) if other is gait), None)
+    if k is None:
+        lines.append("  interpolated between its neighbours (eq. 13); the audit is theirs")
+    elif library.audit:
+        lines += ["", library.audit[k].table()]
+    return "\n".join(lines)
+
+
+def _why(losses: Sequence[Any], order: int) -> str:
+    """What the order and its neighbours lose over the whole library."""
+    near = [loss for loss in losses if abs(loss[0] - order) <= 2]
+    parts = [f"{int(n)}: {joints:.1e} rad, {1e3 * feet:.2g} mm" for n, joints, feet in near]
+    return "worst loss of joints and feet by order, " + "; ".join(parts)

@@ -1,0 +1,69 @@
+"""How nearly a gait in its Bezier form obeys the equations of motion."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from .._typing import Array
+from ..dynamics import Contact, contact_jacobian
+from ..kinematics import foot_positions
+from ..robot import NB, Robot
+from .gait import Gait, Motion
+from .problem import Base
+from .reintegration import guided_rows
+
+
+class GaitResidual(NamedTuple):
+    """What is missing in the equations of motion (2), where it is most."""
+
+    force: float
+    """Along the trunk's x and z [N]."""
+    moment: float
+    """In the joints, and about the trunk's pitch where it is free [N m]."""
+    height: float
+    """Distance of the standing feet from the ground [m]."""
+
+
+def missing_forces(robot: Robot, motion: Motion, contact: Contact) -> Array:
+    """What a motion, its torques and its contact forces leave in eq. (2), shape (n, 18)."""
+    missing = []
+    for q, v, a, tau, lam in zip(motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True):
+        force = pin.rnea(robot.model, robot.data, q, v, a).copy()
+        force -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
+        force[NB:] -= tau
+        missing.append(force)
+    return np.array(missing)
+
+
+def gait_residual(
+    robot: Robot,
+    gait: Gait,
+    *,
+    contact: Contact = "rolling",
+    base: Base = "locked",
+    samples: int = 41,
+) -> GaitResidual:
+    """Put a gait's motion, torques and contact forces into the equations of motion.
+
+    Args:
+        robot: The robot.
+        gait: The gait.
+        contact: How its feet stand.
+        base: How the trunk may move; what a guide holds it by is not missing.
+        samples: Phases at which to look, in each phase of the gait.
+    """
+    rows = guided_rows(robot, base)
+    force = moment = height = 0.0
+    for phase in gait.phases:
+        motion = phase.motion(robot, np.linspace(0.0, 1.0, samples))
+        missing = np.abs(missing_forces(robot, motion, contact)[:, rows])
+        force = max(force, float(np.max(missing[:, :2])))
+        moment = max(moment, float(np.max(missing[:, 2:])))
+        if phase.feet:
+            legs = [robot.legs.index(leg) for leg in phase.feet]
+            above = foot_positions(robot, motion.q)[:, legs, 2] - robot.foot_radius
+            height = max(height, float(np.max(np.abs(above))))
+    return GaitResidual(force, moment, height)

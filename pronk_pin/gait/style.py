@@ -1,0 +1,139 @@
+"""The gaits known by name: what a gait problem of each style looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, cast, get_args
+
+import numpy as np
+
+from .._state import known_name
+from ..errors import InvalidInput
+from ..robot import Robot
+from .problem import BOUND, PITCHING_PRONK, PRONK, Base, ContactPhase, GaitProblem
+
+
+@dataclass(frozen=True)
+class Style:
+    """A kind of gait.
+
+    Attributes:
+        name: Short name, as on the command line.
+        sequence: The phases of a stride.
+        base: How the trunk may move, unless asked otherwise.
+        pitching: The phases with a mesh for a trunk that pitches.
+        speeds: Speeds of its library [m/s].
+        apex: Greatest height of the trunk in its library [m].
+        stride: Shortest and longest stride [s].
+    """
+
+    name: str
+    sequence: tuple[ContactPhase, ...]
+    base: Base
+    pitching: tuple[ContactPhase, ...]
+    speeds: tuple[float, ...]
+    apex: float
+    stride: tuple[float, float]
+
+
+def _speeds(first: float, last: float) -> tuple[float, ...]:
+    """Speeds in steps of 0.1 m/s, both ends included."""
+    steps = range(round(first * 10), round(last * 10) + 1)
+    return tuple(np.round(np.array(steps) * 0.1, 1).tolist())
+
+
+SPEEDS: tuple[float, ...] = _speeds(-0.5, 0.8)
+"""The paper's 14 speeds, -0.5 to 0.8 m/s."""
+
+STYLES: Mapping[str, Style] = {
+    style.name: style
+    for style in (
+        Style("pronk", PRONK, "locked", PITCHING_PRONK, SPEEDS, 0.34, (0.36, 0.6)),
+        Style("bound", BOUND, "sagittal", BOUND, _speeds(-0.2, 0.8), 0.3, (0.3, 0.6)),
+    )
+}
+"""Styles known by name."""
+
+
+def load_style(name: str) -> Style:
+    """The style of that name.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    return STYLES[known_name("gait", name, STYLES)]
+
+
+def gait_problem(
+    robot: Robot, speed: float, *, gait: str = "pronk", base: Base | None = None, **changes: Any
+) -> GaitProblem:
+    """A gait problem of a style.
+
+    Args:
+        robot: The robot.
+        speed: Average forward speed of the trunk [m/s].
+        gait: Name of the style.
+        base: How the trunk may move; None for the style's own.
+        changes: Other attributes of `GaitProblem`.
+
+    Raises:
+        UnknownName: There is no such gait or base.
+        InvalidInput: The problem makes no sense.
+    """
+    style = load_style(gait)
+    base = style.base if base is None else base
+    given: dict[str, Any] = {
+        "apex": style.apex,
+        "base": base,
+        "sequence": style.pitching if base == "sagittal" else style.sequence,
+        "stride": style.stride,
+    }
+    return GaitProblem(robot, speed, **(given | changes))
+
+
+def known_base(base: str) -> Base:
+    """A base mode by its name.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    return cast(Base, known_name("base", base, get_args(Base)))
+
+
+def number_range(name: str, words: Iterable[str]) -> tuple[float, ...]:
+    """Numbers from words, each a number or a range A:B:STEP with both ends, increasing.
+
+    Raises:
+        InvalidInput: A word is neither.
+    """
+    numbers: set[float] = set()
+    for word in words:
+        try:
+            parts = [float(part) for part in word.split(":")]
+        except ValueError:
+            parts = []
+        if len(parts) == 1 and np.isfinite(parts[0]):
+            numbers.add(parts[0])
+            continue
+        if (
+            len(parts) != 3
+            or not np.all(np.isfinite(parts))
+            or not parts[2] > 0
+            or parts[1] < parts[0]
+        ):
+            raise InvalidInput(
+                f"{name} '{word}' is neither a number nor a range A:B:STEP with A <= B and STEP > 0"
+            )
+        first, last, step = parts
+        count = int(np.floor((last - first) / step + 1e-9)) + 1
+        numbers.update(np.round(first + step * np.arange(count), 9).tolist())
+    return tuple(sorted(numbers))
+
+
+def library_name(robot: str, gait: str = "pronk", base: Base | None = None) -> str:
+    """Name of a shipped library: the robot's, and what is not the default: "a1-bound", say."""
+    style = load_style(gait)
+    extra = [] if gait == "pronk" else [gait]
+    extra += [] if base in (None, style.base) else [str(base)]
+    return "-".join([robot, *extra])
