@@ -100,8 +100,9 @@ def test_gaits_keep_their_speed_and_apex_in_mujoco(robot: Robot) -> None:
 
 
 @pytest.mark.slow
-def test_every_gait_keeps_its_speed_and_apex_in_mujoco(robot: Robot) -> None:
-    check(robot, load_library("a1").gaits)
+@pytest.mark.parametrize("name", ["a1", "go1", "go2"])
+def test_every_gait_keeps_its_speed_and_apex_in_mujoco(name: str) -> None:
+    check(load_robot(name), load_library(name).gaits)
 
 
 def test_a_gait_of_point_feet_does_not_keep_its_speed(robot: Robot) -> None:
