@@ -16,7 +16,7 @@ from pronk_pin.compare.scenario import Scenario
 from pronk_pin.compare.world import World
 from pronk_pin.control.tape import Gains, Player, Tape
 from pronk_pin.gait import Gait, GaitProblem, bezier, load_library, optimize_gait
-from pronk_pin.robot import Robot
+from pronk_pin.robot import Robot, load_robot
 
 RIGID = Scenario("rigid", ground_time_constant=2e-4, timestep=1e-4)
 STRIDES = 6
