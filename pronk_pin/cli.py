@@ -166,25 +166,39 @@ class Build:
 
 
 @dataclass(frozen=True)
-class Show:
-    """Print the proof of a gait library: violations, residuals, drift, limits."""
+class _OfLibrary:
+    """Which gaits of which library a command looks at."""
 
-    speed: Positional[float | None] = None
-    """One gait in detail [m/s]; by default a line for each."""
     apex: float | None = None
-    """Its greatest height of the trunk [m]; by default the library's own."""
+    """Greatest height of the trunk [m]; by default the library's own."""
     library: Path | None = None
     """Library file; by default the shipped one."""
     robot: str = "a1"
-    """Robot whose shipped library is shown."""
+    """Robot whose shipped library it is."""
     gait: str = "pronk"
     """Which of its gaits: pronk or bound."""
     base: str | None = None
     """How the trunk may move in it; by default the gait's own."""
 
+    def load(self) -> GaitLibrary:
+        """The library, even one that failed its audit."""
+        if self.library is not None:
+            return GaitLibrary.load(self.library, audited=False)
+        load_robot(self.robot)
+        base = None if self.base is None else known_base(self.base)
+        return load_library(self.robot, gait=self.gait, base=base)
+
+
+@dataclass(frozen=True)
+class Show(_OfLibrary):
+    """Print the proof of a gait library: violations, residuals, drift, limits."""
+
+    speed: Positional[float | None] = None
+    """One gait in detail [m/s]; by default a line for each."""
+
     def run(self) -> None:
         """Do it."""
-        library = _shown(self)
+        library = self.load()
         if self.speed is None:
             print(describe_library(library))
         else:
@@ -192,21 +206,11 @@ class Show:
 
 
 @dataclass(frozen=True)
-class Plot:
+class Plot(_OfLibrary):
     """Draw a gait library: joints, torques, forces and trunk over the stride, and a side view."""
 
     speed: Positional[float | None] = None
     """Speed of the side view [m/s]; by default the one nearest to 0.5."""
-    apex: float | None = None
-    """Greatest height of the trunk [m]; by default the library's own."""
-    library: Path | None = None
-    """Library file; by default the shipped one."""
-    robot: str = "a1"
-    """Robot whose shipped library is drawn."""
-    gait: str = "pronk"
-    """Which of its gaits: pronk or bound."""
-    base: str | None = None
-    """How the trunk may move in it; by default the gait's own."""
     folder: Path = Path("figures")
     """Where to write the figures."""
     format: str = "png"
@@ -214,9 +218,8 @@ class Plot:
 
     def run(self) -> None:
         """Do it."""
-        library = _shown(self)
         paths = write_gait_figures(
-            library, self.folder, speed=self.speed, apex=self.apex, suffix=self.format
+            self.load(), self.folder, speed=self.speed, apex=self.apex, suffix=self.format
         )
         for path in paths:
             print(f"figure  {path}")
@@ -323,15 +326,6 @@ def _library(path: Path | None, robot: str) -> GaitLibrary:
         load_robot(robot)
         return load_library(robot)
     return GaitLibrary.load(path)
-
-
-def _shown(command: Show | Plot) -> GaitLibrary:
-    """The library that a command looks at; one that failed its audit too."""
-    if command.library is not None:
-        return GaitLibrary.load(command.library, audited=False)
-    load_robot(command.robot)
-    base = None if command.base is None else known_base(command.base)
-    return load_library(command.robot, gait=command.gait, base=base)
 
 
 def _default_speed(speed: float | None) -> float:
