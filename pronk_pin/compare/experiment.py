@@ -33,7 +33,7 @@ class Experiment:
     Attributes:
         robot: Short name of the robot.
         speeds: Desired speeds [m/s].
-        controllers: Short names of the controllers: pd, ilc, model, library, model+ilc, ilc-paper.
+        controllers: Short names of the controllers: any of `control.CONTROLLERS`.
         scenarios: Short names of the worlds: ideal, nominal, payload, weak-motors, soft-ground.
         seeds: Seeds of the scatter at the start.
         base: How the trunk moves: "locked" to x and z.

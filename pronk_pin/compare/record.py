@@ -34,7 +34,7 @@ class StrideLog:
         base: Trunk x, z [m] in `stance` and `flight`, each of shape (n, strides, samples, 2).
     """
 
-    SCALARS = ("start", "duration", "stance", "speed", "apex", "upright", "learning")
+    SCALARS = ("start", "duration", "stance", "speed", "apex", "upright", "learning", "skipped")
     PHASES = ("stance", "flight")
     CURVES = ("error", "feedback", "feedforward", "flight")
 
@@ -90,6 +90,11 @@ class StrideLog:
         self.scalars["upright"][at] = upright
         self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
         return np.asarray(duration)
+
+    def judge(self, rows: IntArray, skipped: IntArray) -> None:
+        """Why nothing was learned from the strides that have just ended, see `StrideSelection`."""
+        made = self.count[rows] > 0
+        self.scalars["skipped"][rows[made], self.count[rows[made]] - 1] = skipped[made]
 
     def finish(self, upright: BoolArray) -> None:
         """The simulation has ended; a fall in an unfinished stride counts for the last finished."""

@@ -102,9 +102,17 @@ class Simulation:
         self.world = World(robot, scenario, n)
         ticks = self.controller.max_ticks
         self._player = Player(n, ticks, spec.gains, robot.tau_max)
-        self._joints, self._rates, self._feedback, self._forward = np.zeros((4, n, ticks, NL))
+        self._joints, self._rates = np.zeros((2, n, ticks, NL))
+        self._feedback, self._forward, self._missing = np.zeros((3, n, ticks, NL))
         self._base = np.zeros((n, ticks, 2))
-        self._channels = self._joints, self._rates, self._feedback, self._forward, self._base
+        self._channels = (
+            self._joints,
+            self._rates,
+            self._feedback,
+            self._forward,
+            self._missing,
+            self._base,
+        )
         self._late = spec.touchdown_ticks
         self._flying = np.zeros(n, dtype=bool)
         self._rows = np.arange(n)
@@ -169,6 +177,7 @@ class Simulation:
         at = (self._rows, player.tick)
         self._joints[at], self._rates[at] = world.joints, world.joint_rates
         self._feedback[at], self._forward[at] = feedback, feedforward
+        self._missing[at] = torque - feedback - feedforward
         self._base[at] = world.base
         world.step(torque)
         player.tick += 1
@@ -209,7 +218,9 @@ class Simulation:
         self._begin_stance(rows, duration, touchdown)
 
     def _begin_stance(self, rows: IntArray, duration: Array, touchdown: float) -> None:
-        self._player.load(rows, self.controller.touchdown(rows, duration))
+        tape = self.controller.touchdown(rows, duration, self.upright[rows])
+        self.log.judge(rows, self.controller.skipped[rows])
+        self._player.load(rows, tape)
         self._flying[rows] = False
         x = self._base[rows, 0, 0]
         self.log.open(rows, touchdown, x, learning=self.controller.learning)
@@ -220,6 +231,7 @@ class Simulation:
             self._rates[rows],
             self._feedback[rows],
             self._forward[rows],
+            self._missing[rows],
             length,
             felt,
         )

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from ..control import phase_grid
+from ..control import SKIPPED, phase_grid
 from ..gait import Gait
 from ..robot import Robot
 from .record import SAMPLES, StrideLog
@@ -25,6 +25,7 @@ _UNITS = {
     "apex": ("m", "greatest height of the trunk in flight"),
     "upright": ("1", "1 as long as the robot has not fallen"),
     "learning": ("1", "1 where the stride was played with the learning law on"),
+    "skipped": ("1", "why nothing was learned from the stride, 0 if nothing was wrong with it"),
     "peak_error": ("rad", "peak of the stance error against the unmodified reference"),
     "rms_error": ("rad", "root mean square of the stance error"),
     "contact_error": ("rad", "peak of the stance error from the contact on, before it was felt"),
@@ -78,6 +79,10 @@ def to_dataset(
         if "stride" in dataset[name].dims:
             dataset[name] = dataset[name].where(finished)
         dataset[name].attrs.update(units=unit, long_name=text)
+    dataset["skipped"].attrs.update(
+        flag_values=list(range(len(SKIPPED))),
+        flag_meanings=" ".join(reason.replace(" ", "_") for reason in SKIPPED),
+    )
     return dataset
 
 

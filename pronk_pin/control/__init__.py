@@ -2,7 +2,20 @@
 
 from .controller import CONTROLLERS, Controller, ControllerSpec, load_controller
 from .filters import ZeroPhaseFilter
-from .learning import LearningLaw, PaperILC, PDTypeILC, StrideSelection
+from .learning import (
+    SKIPPED,
+    CurrentIterationILC,
+    LearningLaw,
+    ModelBasedILC,
+    NormOptimalILC,
+    PaperILC,
+    PDTypeILC,
+    PlantInversionILC,
+    StrideSelection,
+    anti_windup,
+)
+from .lifted import LiftedModel
+from .linearise import Settings, lifted_model
 from .record import SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Player, Tape
@@ -11,20 +24,29 @@ from .torque_library import TorqueLibrary
 __all__ = [
     "CONTROLLERS",
     "SAMPLES",
+    "SKIPPED",
     "Controller",
     "ControllerSpec",
+    "CurrentIterationILC",
     "Gains",
     "LearningLaw",
     "LegAngleRegulator",
+    "LiftedModel",
+    "ModelBasedILC",
+    "NormOptimalILC",
     "PDTypeILC",
     "PaperILC",
     "PhaseLog",
+    "PlantInversionILC",
     "Player",
+    "Settings",
     "StrideRecord",
     "StrideSelection",
     "Tape",
     "TorqueLibrary",
     "ZeroPhaseFilter",
+    "anti_windup",
+    "lifted_model",
     "load_controller",
     "phase_grid",
     "resample",

@@ -7,18 +7,29 @@ whoever plays the tapes; the controller is called at the events and answers with
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .._state import known_name
-from .._typing import Array, IntArray
+from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
 from .estimation import SpeedEstimator
-from .learning import LearningLaw, PaperILC, PDTypeILC, StrideSelection
+from .filters import ZeroPhaseFilter
+from .learning import (
+    CurrentIterationILC,
+    LearningLaw,
+    ModelBasedILC,
+    PaperILC,
+    PDTypeILC,
+    StrideSelection,
+    anti_windup,
+    given,
+)
+from .linearise import Settings, lifted_model
 from .record import SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
@@ -70,6 +81,8 @@ CONTROLLERS = {
         ControllerSpec("library", source="library"),
         ControllerSpec("model+ilc", source="model", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
+        ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
+        ControllerSpec("ilc-current", law=CurrentIterationILC()),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
@@ -91,6 +104,8 @@ class Controller:
         feedforward: The feedforward in use, on the phase grid of stance [N m], shape
             (n, samples, 12).
         learning: Whether the law is switched on.
+        skipped: Why the robots' last strides are not worth learning from, index into `SKIPPED`,
+            shape (n,).
     """
 
     def __init__(
@@ -114,10 +129,17 @@ class Controller:
         self.feedforward = feedforward.copy()
         self.learning = False
         self._timestep = timestep
+        self.skipped = np.zeros(n, dtype=np.intp)
         self._last = StrideRecord.unknown(n)
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
+        self._law = spec.law
+        if isinstance(spec.law, ModelBasedILC):
+            settings = Settings(
+                spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
+            )
+            self._law = spec.law.along([lifted_model(robot, gait, settings) for gait in gaits])
         self._tabulate()
 
     def _tabulate(self) -> None:
@@ -156,15 +178,17 @@ class Controller:
         zero = np.zeros_like(position)
         return Tape(zero, position, zero, np.ones(len(position), dtype=np.intp))
 
-    def touchdown(self, rows: IntArray, duration: Array) -> Tape:
+    def touchdown(self, rows: IntArray, duration: Array, upright: BoolArray | None = None) -> Tape:
         """Stance tapes for robots that have just touched down; learns from their last stride.
 
         Args:
             rows: Which robots.
             duration: How long their strides lasted [s], shape (len(rows),).
+            upright: Whether they have not fallen, shape (len(rows),); all by default.
         """
-        if self.learning and self.spec.law is not None:
-            self._learn(self.spec.law, rows, duration)
+        self._judge(rows, duration, upright)
+        if self.learning and self._law is not None:
+            self._learn(self._law, rows)
         return Tape(
             feedforward=resample(self.feedforward[rows], self._phase[rows] * (SAMPLES - 1)),
             position=self._stance[rows],
@@ -197,17 +221,28 @@ class Controller:
             error_rate=resample(rate, index),
             feedback=resample(log.feedback, index),
             feedforward=self.feedforward[rows],
+            missing=resample(log.missing, index),
             contact_error=np.abs(error[:, : log.felt]).max(axis=1, initial=0.0),
             relative_duration=np.full(len(rows), np.nan),
+            upright=np.ones(len(rows), dtype=bool),
+            robot=rows,
         )
 
-    def _learn(self, law: LearningLaw, rows: IntArray, duration: Array) -> None:
+    def _judge(self, rows: IntArray, duration: Array, upright: BoolArray | None) -> None:
+        """Complete the records of the last strides, and tell why some teach nothing."""
+        self._last.relative_duration[rows] = duration / (
+            self._stance_time[rows] + self._flight_time[rows]
+        )
+        self._last.upright[rows] = True if upright is None else upright
+        self.skipped[rows] = self.spec.selection.skipped(self._last.take(rows))
+
+    def _learn(self, law: LearningLaw, rows: IntArray) -> None:
         """Update the feedforward of those robots whose last stride is worth learning from."""
-        planned = self._stance_time[rows] + self._flight_time[rows]
-        record = replace(self._last.take(rows), relative_duration=duration / planned)
-        usable = self.spec.selection.usable(record)
-        if usable.any():
-            self.feedforward[rows[usable]] = law.update(record)[usable]
+        rows = rows[self.skipped[rows] == 0]
+        if rows.size:
+            record = self._last.take(rows)
+            learned = law.update(given(record))
+            self.feedforward[rows] = anti_windup(learned, record, self.robot.tau_max)
 
 
 def _phases(durations: Array, ticks: int, timestep: float) -> Array:

@@ -6,6 +6,8 @@ it was at lift-off. Section II.E of the paper.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .._typing import Array, IntArray
@@ -30,8 +32,19 @@ class SpeedEstimator:
         self.speed = np.zeros(n)
 
     def update(self, rows: IntArray, log: PhaseLog) -> Array:
-        """Take in a stance that some robots have just finished; their new estimates [m/s]."""
+        """Take in a stance that some robots have just finished; their new estimates [m/s].
+
+        Where a sensor failed the estimate stays as it was.
+        """
         n, ticks = len(rows), int(log.length.max())
+        used = np.arange(ticks) < log.length[:, None]
+        sound = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1) | ~used
+        if not sound.all():
+            log = replace(
+                log,
+                joints=np.nan_to_num(log.joints, posinf=0.0, neginf=0.0),
+                joint_rates=np.nan_to_num(log.joint_rates, posinf=0.0, neginf=0.0),
+            )
         # The base is level: locked here, and an attitude estimate's business elsewhere.
         q = self._robot.q_from_base(np.zeros((n, ticks, 3)), log.joints[:, :ticks])
         v = np.concatenate([np.zeros((n, ticks, 6)), log.joint_rates[:, :ticks]], axis=-1)
@@ -44,5 +57,6 @@ class SpeedEstimator:
             time_constant=self._time_constant,
             timestep=self._timestep,
         )
-        self.speed[rows] = filtered[np.arange(n), log.length - 1]
+        latest = filtered[np.arange(n), log.length - 1]
+        self.speed[rows] = np.where(sound.all(axis=1), latest, self.speed[rows])
         return self.speed[rows]

@@ -5,14 +5,16 @@ A law is a function with parameters and no state: what was learned so far is in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from .._typing import Array, BoolArray
+from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, look_ahead
+from .lifted import LiftedModel
 from .record import StrideRecord
 from .tape import Gains
 
@@ -25,9 +27,13 @@ class LearningLaw(Protocol):
         ...
 
 
+SKIPPED = ("", "not finite", "fallen", "too short", "too long", "duration unknown")
+"""Why nothing is learned from a stride; the first where nothing is wrong with it."""
+
+
 @dataclass(frozen=True)
 class StrideSelection:
-    """Which strides are worth learning from: those of about the right length.
+    """Which strides are worth learning from: finite, upright, and of about the right length.
 
     Attributes:
         shortest: Shortest stride, over the reference's duration.
@@ -37,12 +43,55 @@ class StrideSelection:
     shortest: float = 0.7
     longest: float = 1.4
 
+    def skipped(self, record: StrideRecord) -> IntArray:
+        """Why the robots' strides are not, as an index into `SKIPPED`, shape (n,)."""
+        parts = (record.error, record.error_rate, record.feedback, record.feedforward)
+        finite = np.all([np.isfinite(part).all(axis=(1, 2)) for part in parts], axis=0)
+        duration = record.relative_duration
+        checks = [
+            ~finite,
+            ~record.upright,
+            duration < self.shortest,
+            duration > self.longest,
+            np.isnan(duration),
+        ]
+        return np.asarray(np.select(checks, range(1, len(SKIPPED)), default=0), dtype=np.intp)
+
     def usable(self, record: StrideRecord) -> BoolArray:
         """Which robots' strides are, shape (n,)."""
-        finite = np.isfinite(record.error).all(axis=(1, 2))
-        duration = record.relative_duration  # NaN is not within
-        within = (duration >= self.shortest) & (duration <= self.longest)
-        return np.asarray(finite & within)
+        return np.asarray(self.skipped(record) == 0)
+
+
+def given(record: StrideRecord) -> StrideRecord:
+    """The record with the torques that the motors gave: what they cut off was feedback's first.
+
+    The paper's law stores the recorded torque; what the motors could not give is not in it.
+    """
+    feedback = record.feedback
+    cut = np.clip(record.missing, -np.abs(feedback), np.abs(feedback))
+    cut = np.where(cut * feedback < 0.0, cut, 0.0)
+    rest = record.missing - cut
+    return replace(record, feedback=feedback + cut, feedforward=record.feedforward + rest)
+
+
+def anti_windup(learned: Array, record: StrideRecord, tau_max: Array) -> Array:
+    """The next feedforward [N m] without what the motors could not give.
+
+    Where they were at their limit in the last stride, nothing is added in that direction; and the
+    memory never holds more than the limit.
+
+    Args:
+        learned: What the law answers, shape (n, samples, 12).
+        record: The stride that it answers.
+        tau_max: The motors' limits [N m], shape (12,).
+    """
+    before = record.feedforward
+    further = (learned - before) * record.missing < -_CUT
+    return np.clip(np.where(further, before, learned), -tau_max, tau_max)
+
+
+_CUT = 1e-9
+"""Product of torques [(N m)^2] below which a motor did not cut anything off."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +151,165 @@ class PaperILC:
         """See `LearningLaw.update`."""
         torque = record.feedforward + record.feedback
         return self.filter(torque + _weighted_error(record, self.gains, self.delta))
+
+
+@dataclass(frozen=True)
+class CurrentIterationILC:
+    """Current-iteration law: the feedback that acted in the stride becomes memory.
+
+    `ff <- Q[(1 - leak) ff + gain tau_b(s + delta)]`
+
+    The textbook's form is `u_k = w_k + C e_k` with `w_{k+1} = Q u_k`: the feedback of the present
+    stride is part of the trial, and what it did is learned. No model and no second set of gains;
+    also known as feedback-error learning.
+
+    Attributes:
+        gain: Part of the feedback torque that is taken over; 1 in the textbook.
+        leak: Part of the memory that is forgotten in each stride.
+        delta: Look-ahead in phase.
+        filter: The learning filter Q.
+    """
+
+    gain: float = 0.5
+    leak: float = 0.005
+    delta: float = 0.05
+    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.04))
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.gain < 2.0 and 0.0 <= self.leak <= 1.0 and 0.0 <= self.delta < 1.0):
+            raise InvalidInput(
+                "a current-iteration law needs gain in [0, 2), leak in [0, 1] and delta in [0, 1); "
+                f"got {self.gain:g}, {self.leak:g}, {self.delta:g}"
+            )
+
+    def update(self, record: StrideRecord) -> Array:
+        """See `LearningLaw.update`."""
+        feedback = look_ahead(record.feedback, self.delta)
+        return self.filter((1.0 - self.leak) * record.feedforward + self.gain * feedback)
+
+
+class Directions(NamedTuple):
+    """The directions in which a feedforward moves the errors: a thin SVD of the lifted model."""
+
+    errors: Array
+    """What each does to the errors, orthonormal columns, shape (size, rank)."""
+    gains: Array
+    """How much, decreasing [rad/(N m)], shape (rank,)."""
+    torques: Array
+    """The feedforwards that do it, orthonormal columns, shape (size, rank)."""
+
+    @classmethod
+    def of(cls, model: LiftedModel, *, rank: int = 120) -> Directions:
+        """The strongest directions of a model; a few of 161 x 12, since the rest hardly move it.
+
+        Randomised SVD (Halko, Martinsson and Tropp 2011) with two power iterations.
+        """
+        matrix = model.angle
+        if len(matrix) <= 2 * rank:
+            left, gains, right = np.linalg.svd(matrix)
+        else:
+            rng = np.random.default_rng(0)
+            basis = matrix @ rng.standard_normal((len(matrix), rank))
+            for _ in range(2):
+                basis = matrix @ (matrix.T @ np.linalg.qr(basis)[0])
+            basis = np.linalg.qr(basis)[0]
+            left, gains, right = np.linalg.svd(basis.T @ matrix, full_matrices=False)
+            left = basis @ left
+        return cls(left, gains, right.T)
+
+
+@dataclass(frozen=True)
+class ModelBasedILC:
+    """A law that needs the lifted model of each robot's gait; `along` gives it.
+
+    Attributes:
+        directions: The models' directions, one for each robot; empty until `along`.
+    """
+
+    directions: tuple[Directions, ...] = field(default=(), repr=False, compare=False, kw_only=True)
+
+    def along(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
+        """The law for robots of these models, in the order of `StrideRecord.robot`."""
+        return replace(self, directions=tuple(Directions.of(model) for model in models))
+
+    def update(self, record: StrideRecord) -> Array:
+        """See `LearningLaw.update`."""
+        learned = np.empty_like(record.feedforward)
+        for row, robot in enumerate(record.robot):
+            if robot >= len(self.directions):
+                raise InvalidInput(
+                    f"{type(self).__name__} knows the models of {len(self.directions)} robots and "
+                    f"is asked for robot {robot}; give it theirs by `along(models)`"
+                )
+            error, ff = record.error[row].reshape(-1), record.feedforward[row].reshape(-1)
+            learned[row] = self._next(self.directions[robot], error, ff).reshape(learned[row].shape)
+        return learned
+
+    def _next(self, along: Directions, error: Array, feedforward: Array) -> Array:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class PlantInversionILC(ModelBasedILC):
+    """Plant inversion: the feedforward that would have undone the error, by the model.
+
+    `ff <- (1 - leak) ff + gain G^+ e`, with the inverse cut off where the model hardly answers.
+
+    Attributes:
+        gain: Learning gain; 0 to 1. 1 converges in one stride where the model is right.
+        cutoff: Weakest direction that is inverted, over the strongest.
+        leak: Part of the memory that is forgotten in each stride.
+    """
+
+    gain: float = 0.5
+    cutoff: float = 0.03
+    leak: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.gain < 2.0 and 0.0 < self.cutoff < 1.0 and 0.0 <= self.leak <= 1.0):
+            raise InvalidInput(
+                "plant inversion needs gain in [0, 2), cutoff in (0, 1) and leak in [0, 1]; "
+                f"got {self.gain:g}, {self.cutoff:g}, {self.leak:g}"
+            )
+
+    def _next(self, along: Directions, error: Array, feedforward: Array) -> Array:
+        kept = along.gains > self.cutoff * along.gains[0]
+        amount = (along.errors[:, kept].T @ error) / along.gains[kept]
+        change = along.torques[:, kept] @ amount
+        return np.asarray((1.0 - self.leak) * feedforward + self.gain * change)
+
+
+@dataclass(frozen=True)
+class NormOptimalILC(ModelBasedILC):
+    """Norm-optimal law: the least sum of squares of error, change and feedforward, by the model.
+
+    The next feedforward minimises `|e|^2 + change |ff - ff_last|^2 + effort |ff|^2` for the
+    predicted error e of the next stride (Gunnarsson and Norrlof 2001).
+
+    Attributes:
+        change: Weight of the change of the feedforward [rad^2/(N m)^2]: slower, but more robust.
+        effort: Weight of the feedforward itself [rad^2/(N m)^2]: what does not help is forgotten.
+    """
+
+    change: float = 3e-4
+    effort: float = 1e-7
+
+    def __post_init__(self) -> None:
+        if not (self.change >= 0.0 and self.effort >= 0.0 and self.change + self.effort > 0.0):
+            raise InvalidInput(
+                "a norm-optimal law needs weights that are not negative, and one that is positive; "
+                f"got change={self.change:g}, effort={self.effort:g}"
+            )
+
+    def _next(self, along: Directions, error: Array, feedforward: Array) -> Array:
+        weight = self.change + self.effort
+        memory = along.torques.T @ feedforward
+        amount = along.gains * (along.errors.T @ error) - self.effort * memory
+        amount = amount / (along.gains**2 + weight)
+        # Along the other directions only the effort counts.
+        rest = feedforward - along.torques @ memory
+        change = along.torques @ amount - self.effort / weight * rest
+        return np.asarray(feedforward + change)
 
 
 def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:

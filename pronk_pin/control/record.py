@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from .._typing import Array, IntArray
+from .._typing import Array, BoolArray, IntArray
 from ..robot import NL
 
 SAMPLES = 161
@@ -22,6 +22,8 @@ class PhaseLog:
         joint_rates: Joint velocities [rad/s], shape (n, ticks, 12).
         feedback: Torque of the feedback [N m], shape (n, ticks, 12).
         feedforward: Torque of the feedforward [N m], shape (n, ticks, 12).
+        missing: What the motors' limits cut off: torque given minus asked for [N m], shape
+            (n, ticks, 12).
         length: Ticks that the phase lasted; later ones hold nothing of it, shape (n,).
         felt: Tick at which its beginning was felt: those before were played on the tape before.
     """
@@ -30,6 +32,7 @@ class PhaseLog:
     joint_rates: Array
     feedback: Array
     feedforward: Array
+    missing: Array
     length: IntArray
     felt: int = 0
 
@@ -58,23 +61,49 @@ class StrideRecord:
         error_rate: Its time derivative [rad/s].
         feedback: Torque of the feedback, eq. (9) [N m].
         feedforward: Torque of the feedforward [N m].
+        missing: What the motors' limits cut off: torque given minus asked for [N m].
         relative_duration: Duration of the stride over the reference's, shape (n,); NaN as long as
             the stride goes on.
         contact_error: Largest error between the contact and its being felt [rad], shape (n, 12).
+        upright: Whether the robot has not fallen, shape (n,).
+        robot: Which of the controller's robots made the stride, shape (n,).
     """
 
     error: Array
     error_rate: Array
     feedback: Array
     feedforward: Array
+    missing: Array
     relative_duration: Array
     contact_error: Array
+    upright: BoolArray
+    robot: IntArray
 
     @classmethod
     def unknown(cls, n: int) -> StrideRecord:
         """The record of n robots that have made no stride yet: NaN."""
-        shapes = [(n, SAMPLES, NL)] * 4 + [(n,), (n, NL)]
-        return cls(*(np.full(shape, np.nan) for shape in shapes))
+        shapes = [(n, SAMPLES, NL)] * 5 + [(n,), (n, NL)]
+        names = [item.name for item in fields(cls)]
+        unknown = {name: np.full(shape, np.nan) for name, shape in zip(names, shapes, strict=False)}
+        return cls(**unknown, upright=np.ones(n, dtype=bool), robot=np.arange(n))
+
+    @classmethod
+    def of(
+        cls, error: Array, error_rate: Array, feedback: Array, feedforward: Array
+    ) -> StrideRecord:
+        """The record of strides in which nothing went wrong: arrays (n, samples, joints)."""
+        n, _, joints = error.shape
+        return cls(
+            error=error,
+            error_rate=error_rate,
+            feedback=feedback,
+            feedforward=feedforward,
+            missing=np.zeros_like(error),
+            relative_duration=np.ones(n),
+            contact_error=np.zeros((n, joints)),
+            upright=np.ones(n, dtype=bool),
+            robot=np.arange(n),
+        )
 
     def take(self, rows: IntArray) -> StrideRecord:
         """The record of some of the robots, copied."""

@@ -93,6 +93,7 @@ class Player:
         at = (self._rows, self.tick)
         feedback = self._kp * (self._position[at] - joints)
         feedback += self._kd * (self._velocity[at] - joint_rates)
+        feedback[~np.isfinite(feedback)] = 0.0  # a sensor that fails must not reach the motors
         feedforward = self._feedforward[at]
         torque = np.clip(feedforward + feedback, -self._tau_max, self._tau_max)
         return torque, feedback, feedforward

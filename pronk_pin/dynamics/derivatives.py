@@ -128,7 +128,7 @@ def _implicit(
     q, v, _ = state
     a, lam, _ = stance_accelerations(robot, state, legs, radius, NO_GAINS)
     nv = robot.nv
-    r_q, r_v, c_q, c_v = _partials(robot, (q, v, a), lam.reshape(-1, 3), legs, radius)
+    r_q, r_v, c_q, c_v = partials(robot, (q, v, a), lam.reshape(-1, 3), legs, radius)
     right = np.hstack([-r_q, -r_v, np.eye(nv, robot.nu, k=-NB)])  # (18, 48)
     free = np.linalg.solve(pin.crba(robot.model, robot.data, q), right)
     jacobian = jacobian_at(robot, q, legs, radius)
@@ -140,7 +140,7 @@ def _implicit(
     return StanceDerivatives(a_q, a_v, a_tau, lam_q, lam_v, lam_tau, response.singular)
 
 
-def _partials(
+def partials(
     robot: Robot,
     motion: tuple[Array, Array, Array],
     forces: Array,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ CONTACT = np.full((1, 12), 0.04)
 
 def phase(ticks: int, *, felt: int = 0) -> PhaseLog:
     joints = np.repeat(np.arange(ticks + 10.0)[None, :, None], 12, axis=2)
-    return PhaseLog(joints, joints, joints, joints, np.array([ticks]), felt)
+    return PhaseLog(joints, joints, joints, joints, 0.0 * joints, np.array([ticks]), felt)
 
 
 def trunk(ticks: int, z: Array) -> Array:
@@ -34,12 +36,15 @@ def log(gaits: list[Gait]) -> StrideLog:
     log = StrideLog(gaits, duration=10.0, timestep=DT)
     error = np.zeros(SHAPE)
     error[0, :, 5] = 0.1 * np.sin(2.0 * np.pi * phase_grid())
-    record = StrideRecord(error, 0.0 * error, 2.0 * error, 3.0 * error, np.ones(1), CONTACT)
+    record = replace(
+        StrideRecord.of(error, 0.0 * error, 2.0 * error, 3.0 * error), contact_error=CONTACT
+    )
     log.open(ROW, 1.0, np.array([0.7]), learning=True)
     log.stance(ROW, record, phase(160, felt=2), trunk(160, np.full(160, 0.3)))
     height = 0.34 - 0.1 * np.linspace(-1.0, 1.0, 201) ** 2
     log.flight(ROW, phase(201), trunk(201, height))
     assert log.close(ROW, 1.4, np.array([0.9]), np.array([True])) == pytest.approx(0.4)
+    log.judge(ROW, np.array([3]))
     return log
 
 
@@ -54,6 +59,7 @@ def test_a_stride_goes_from_touchdown_to_touchdown(log: StrideLog) -> None:
             "apex": 0.34,
             "upright": 1.0,
             "learning": 1.0,
+            "skipped": 3.0,
         }
     )
 

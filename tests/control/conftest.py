@@ -24,7 +24,7 @@ def phase_log() -> Callable[..., PhaseLog]:
 
     def build(joints: Array, joint_rates: Array, *, felt: int = 0) -> PhaseLog:
         n, ticks = joints.shape[:2]
-        none = np.zeros_like(joints)
-        return PhaseLog(joints, joint_rates, none, none, np.full(n, ticks, np.intp), felt)
+        none = np.zeros((3, *joints.shape))
+        return PhaseLog(joints, joint_rates, *none, np.full(n, ticks, np.intp), felt)
 
     return build

@@ -9,6 +9,7 @@ from pronk_pin._typing import Array
 from pronk_pin.control import (
     CONTROLLERS,
     SAMPLES,
+    SKIPPED,
     Controller,
     ControllerSpec,
     PDTypeILC,
@@ -212,7 +213,8 @@ def test_an_unknown_controller_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownName) as caught:
         load_controller("lqr")
     assert str(caught.value) == (
-        "unknown controller 'lqr'; choose one of: pd, ilc, model, library, model+ilc, ilc-paper"
+        "unknown controller 'lqr'; choose one of: pd, ilc, model, library, model+ilc, ilc-paper, "
+        "ilc-paper-exact, ilc-current"
     )
 
 
@@ -233,3 +235,31 @@ def test_what_happens_before_the_touchdown_is_felt_counts_as_contact_error_only(
     _, record = controller.liftoff(BOTH, log)
     np.testing.assert_allclose(record.contact_error, 0.21)
     np.testing.assert_allclose(record.error, 0.01, atol=1e-12)
+
+
+def test_a_motor_at_its_limit_does_not_wind_the_memory_up(
+    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    controller.learning = True
+    log = stances(0.1)
+    log.feedback[0, :, 2], log.missing[0, :, 2] = (
+        9.0,
+        -5.0,
+    )  # the calf asked for more than its motor gave
+    controller.liftoff(BOTH, log)
+    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    np.testing.assert_array_equal(controller.feedforward[0, :, 2], 0.0)
+    assert np.all(controller.feedforward[0, :, 1] > 0.0)
+    assert np.all(controller.feedforward[1] > 0.0)
+
+
+def test_the_reason_why_a_stride_teaches_nothing_is_told(
+    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+) -> None:
+    controller.learning = True
+    log = stances(0.1)
+    log.joints[0, 50, 4] = np.nan  # a sensor failed
+    controller.liftoff(BOTH, log)
+    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]), np.array([True, False]))
+    assert [SKIPPED[code] for code in controller.skipped] == ["not finite", "fallen"]
+    np.testing.assert_array_equal(controller.feedforward, 0.0)

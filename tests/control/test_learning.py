@@ -5,19 +5,27 @@ A joint that needs the torque d, and gets `ff + Kp e`, rests at the error `e = (
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pronk_pin._typing import Array
 from pronk_pin.control import (
     SAMPLES,
+    CurrentIterationILC,
     Gains,
     LearningLaw,
+    LiftedModel,
+    ModelBasedILC,
+    NormOptimalILC,
     PaperILC,
     PDTypeILC,
+    PlantInversionILC,
     StrideRecord,
     StrideSelection,
     ZeroPhaseFilter,
+    anti_windup,
     phase_grid,
 )
 from pronk_pin.errors import InvalidInput
@@ -25,13 +33,12 @@ from pronk_pin.errors import InvalidInput
 KP = Gains().proportional
 LOAD = 6.0 * np.linspace(-1.0, 1.0, 12)  # [N m]
 SHAPE = (1, SAMPLES, 12)
-NOTHING = np.zeros((1, 12))
 
 
 def stride(feedforward: Array) -> StrideRecord:
     """A stride of the quasi-static plant under a feedforward."""
     error = (LOAD - feedforward) / KP
-    return StrideRecord(error, np.zeros(SHAPE), KP * error, feedforward, np.ones(1), NOTHING)
+    return StrideRecord.of(error, np.zeros(SHAPE), KP * error, feedforward)
 
 
 def practise(law: LearningLaw, strides: int) -> Array:
@@ -74,18 +81,14 @@ def test_the_printed_filter_holds_the_papers_law_at_78_percent_reduction() -> No
 def test_an_error_is_answered_earlier_by_the_look_ahead() -> None:
     s = phase_grid()
     bump = np.exp(-(((s - 0.5) / 0.1) ** 2))[None, :, None] * np.ones(12)
-    record = StrideRecord(
-        bump, np.zeros(SHAPE), np.zeros(SHAPE), np.zeros(SHAPE), np.ones(1), NOTHING
-    )
+    record = StrideRecord.of(bump, np.zeros(SHAPE), np.zeros(SHAPE), np.zeros(SHAPE))
     peak = s[np.argmax(PDTypeILC(delta=0.1).update(record)[0, :, 0])]
     assert peak == pytest.approx(0.4, abs=0.01)
 
 
 def test_the_rate_of_the_error_is_weighted_with_the_derivative_gains() -> None:
     ones, none = np.ones(SHAPE), np.zeros(SHAPE)
-    learned = PDTypeILC(gain=0.5, leak=0.0).update(
-        StrideRecord(none, ones, none, none, np.ones(1), NOTHING)
-    )
+    learned = PDTypeILC(gain=0.5, leak=0.0).update(StrideRecord.of(none, ones, none, none))
     np.testing.assert_allclose(learned[0, 80], 0.5 * Gains().derivative, rtol=1e-6)
 
 
@@ -99,6 +102,73 @@ def test_only_finite_strides_of_about_the_right_length_are_worth_learning_from()
     duration = np.array([0.6, 0.75, 1.0, 1.35, 1.5, np.inf, np.nan, 1.0])
     error = np.zeros((8, SAMPLES, 12))
     error[7, 3, 4] = np.nan
-    record = StrideRecord(error, error, error, error, duration, np.zeros((8, 12)))
+    record = replace(StrideRecord.of(error, error, error, error), relative_duration=duration)
     usable = StrideSelection().usable(record)
     assert usable.tolist() == [False, True, True, True, False, False, False, False]
+
+
+TOY = 20  # samples of a one-joint plant
+
+
+def toy(rng: np.random.Generator) -> LiftedModel:
+    """A causal plant of one joint, whose answers fade."""
+    answer = np.tril(0.8 ** np.abs(np.subtract.outer(np.arange(TOY), np.arange(TOY))))
+    torque = rng.normal(size=(TOY, 1))
+    return LiftedModel.with_resets(answer, np.zeros_like(answer), gains=Gains(), torque=torque)
+
+
+def errors(law: ModelBasedILC, model: LiftedModel, strides: int) -> Array:
+    """Norms of the error of the toy's strides, the first without feedforward."""
+    begin = record = model.planned
+    bound, norms = law.along([model]), [np.linalg.norm(begin.error)]
+    for _ in range(strides):
+        record = model.stride(bound.update(record), begin, np.zeros((1, 0)))
+        norms.append(np.linalg.norm(record.error))
+    return np.array(norms)
+
+
+def test_plant_inversion_needs_one_stride_where_the_model_is_right() -> None:
+    model = toy(np.random.default_rng(0))
+    norms = errors(PlantInversionILC(gain=1.0, cutoff=1e-6), model, 1)
+    assert norms[1] < 1e-10 * norms[0]
+
+
+def test_plant_inversion_diverges_where_the_plant_is_more_than_twice_the_model() -> None:
+    model = toy(np.random.default_rng(0))
+    law = PlantInversionILC(gain=1.0, cutoff=1e-6).along([model])
+    for factor, grows in ((1.9, False), (2.1, True)):
+        plant = model.scaled(factor)
+        begin = plant.planned
+        after = plant.stride(law.update(begin), begin, np.zeros((1, 0)))
+        assert (np.linalg.norm(after.error) > np.linalg.norm(begin.error)) == grows
+
+
+def test_the_norm_optimal_law_converges_monotonically() -> None:
+    norms = errors(NormOptimalILC(change=0.5, effort=0.0), toy(np.random.default_rng(1)), 60)
+    assert np.all(np.diff(norms) < 0.0)
+    assert norms[-1] < 1e-3 * norms[0]
+
+
+def test_the_norm_optimal_law_minimises_what_it_says() -> None:
+    model, change, effort = toy(np.random.default_rng(2)), 0.3, 0.2
+    begin = model.planned
+    u = NormOptimalILC(change=change, effort=effort).along([model]).update(begin).reshape(-1)
+    gradient = -model.angle.T @ (begin.error.reshape(-1) - model.angle @ u) + (change + effort) * u
+    np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
+
+
+def test_a_model_based_law_without_its_models_says_what_to_do() -> None:
+    with pytest.raises(InvalidInput, match=r"give it theirs by `along\(models\)`"):
+        NormOptimalILC().update(toy(np.random.default_rng(0)).planned)
+
+
+def test_the_current_iteration_law_takes_over_what_the_feedback_did() -> None:
+    shares = practise(CurrentIterationILC(gain=0.5, leak=0.0), 6)
+    np.testing.assert_allclose(shares, 0.5 ** np.arange(6), atol=1e-6)
+
+
+def test_the_memory_never_holds_more_than_the_motor_can_give() -> None:
+    none = np.zeros(SHAPE)
+    record = StrideRecord.of(none, none, none, none)
+    held = anti_windup(np.full(SHAPE, 50.0), record, np.full(12, 33.5))
+    np.testing.assert_array_equal(held, 33.5)

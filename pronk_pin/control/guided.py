@@ -1,0 +1,145 @@
+"""Linear dynamics of the guided robot: its trunk held to x and z, all feet standing or none.
+
+The guide takes the trunk's y and its rotations. What is left free are x, z and the joints, 14
+coordinates y with the rates y'; a derivative is by these.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from .._typing import Array
+from ..dynamics import Contact, contact_bias, contact_jacobian
+from ..dynamics.derivatives import partials
+from ..gait.reintegration import guided_rows
+from ..robot import NB, Robot
+
+
+class Rotors(NamedTuple):
+    """What a joint adds to the URDF's dynamics, the same for all joints."""
+
+    armature: float = 0.0
+    """Rotor inertia as the joint feels it [kg m^2]."""
+    damping: float = 0.0
+    """Viscous friction [N m s/rad]."""
+
+
+NO_ROTORS = Rotors()
+"""The URDF as it stands."""
+
+
+class GuidedDerivatives(NamedTuple):
+    """Derivatives of the guided robot's acceleration at one state."""
+
+    a: Array
+    """The acceleration of x, z and the joints, shape (14,)."""
+    da_dy: Array
+    """By the coordinates, shape (14, 14)."""
+    da_dv: Array
+    """By their rates, shape (14, 14)."""
+    da_dtau: Array
+    """By the motor torques, shape (14, 12)."""
+
+
+def guided_derivatives(
+    robot: Robot,
+    q: Array,
+    v: Array,
+    tau: Array,
+    *,
+    contact: Contact | None = None,
+    rotors: Rotors = NO_ROTORS,
+) -> GuidedDerivatives:
+    """Eq. (5), or (2) in flight, solved on the guided rows and differentiated as a whole.
+
+    With r(q, v, a, lam) = M a + H v + G - J^T lam and c(q, v, a) the contact points' acceleration,
+    on the rows and columns that the guide leaves free,
+
+        M da - J^T dlam = S dtau - r_q dq - r_v dv,    J da = -c_q dq - c_v dv.
+
+    Args:
+        robot: The robot.
+        q: Configuration with a level trunk, shape (19,).
+        v: Velocity, shape (18,), zero where the guide holds the trunk.
+        tau: Motor torques [N m], shape (12,).
+        contact: How all the feet stand on the ground; None in flight.
+        rotors: What the joints add to the URDF.
+    """
+    rows = guided_rows(robot)
+    free, motors = len(rows), np.eye(robot.nv, robot.nu, k=-NB)[rows]  # (14, 12)
+    kkt, right = _equations(robot, q, v, tau, contact, rotors)
+    solution = np.linalg.solve(kkt, right)
+    a = np.zeros(robot.nv)
+    a[rows] = solution[:free]
+    legs = tuple(range(len(robot.legs))) if contact is not None else ()
+    radius = robot.foot_radius if contact == "rolling" else 0.0
+    parts = partials(
+        robot, (q, v, a), np.asarray(solution[free:].reshape(-1, 3), dtype=float), legs, radius
+    )
+    r_q, r_v, c_q, c_v = (part[:, rows] for part in parts)
+    r_v = r_v[rows] + rotors.damping * np.diag(_joints(robot))
+    sides = np.block([[-r_q[rows], -r_v, motors], [-c_q, -c_v, np.zeros((len(c_q), robot.nu))]])
+    da_dy, da_dv, da_dtau = np.hsplit(np.linalg.solve(kkt, sides)[:free], [free, 2 * free])
+    return GuidedDerivatives(a[rows], da_dy, da_dv, da_dtau)
+
+
+def guided_acceleration(
+    robot: Robot,
+    q: Array,
+    v: Array,
+    tau: Array,
+    *,
+    contact: Contact | None = None,
+    rotors: Rotors = NO_ROTORS,
+) -> tuple[Array, float]:
+    """The acceleration alone, shape (14,), and the force of the ground, up, on all feet [N].
+
+    Arguments of `guided_derivatives`.
+    """
+    kkt, right = _equations(robot, q, v, tau, contact, rotors)
+    a, lam = np.split(np.linalg.solve(kkt, right), [len(guided_rows(robot))])
+    return a, float(lam[2::3].sum())
+
+
+def guided_impact(
+    robot: Robot, q: Array, v: Array, *, contact: Contact, rotors: Rotors = NO_ROTORS
+) -> Array:
+    """Rates (m, 14) after a plastic impact of all feet, from rates (m, 14) before it."""
+    rows = guided_rows(robot)
+    mass = _mass(robot, q, rotors)
+    jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
+    answer = np.linalg.solve(mass, jacobian.T)
+    impulse = np.linalg.solve(jacobian @ answer, jacobian @ v.T)
+    return np.asarray(v - (answer @ impulse).T)
+
+
+def _equations(
+    robot: Robot, q: Array, v: Array, tau: Array, contact: Contact | None, rotors: Rotors
+) -> tuple[Array, Array]:
+    """Matrix and right-hand side of eq. (5) on the free rows."""
+    rows, joints = guided_rows(robot), _joints(robot)
+    mass = _mass(robot, q, rotors)
+    force = -pin.nonLinearEffects(robot.model, robot.data, q, v)[rows]
+    force -= rotors.damping * joints * v[rows]
+    force[joints == 1.0] += tau
+    if contact is None:
+        return mass, np.asarray(force)
+    jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
+    bias = contact_bias(robot, q, v, contact=contact)
+    corner = np.zeros((len(jacobian), len(jacobian)))
+    kkt = np.block([[mass, -jacobian.T], [jacobian, corner]])
+    return kkt, np.concatenate([force, -bias])
+
+
+def _mass(robot: Robot, q: Array, rotors: Rotors) -> Array:
+    rows = guided_rows(robot)
+    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]
+    return np.asarray(mass + rotors.armature * np.diag(_joints(robot)))
+
+
+def _joints(robot: Robot) -> Array:
+    """1 for each joint and 0 for x and z, shape (14,)."""
+    return np.concatenate([np.zeros(2), np.ones(robot.nu)])

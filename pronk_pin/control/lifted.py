@@ -1,0 +1,154 @@
+"""The lifted linear model: what the feedforward of a stance does to its errors, and to the next.
+
+Along the gait the guided robot under its feedback is a linear time-varying system. Stacked over the
+phase grid, its answer to a change of the feedforward is a matrix, and a learning law becomes an
+iteration that linear algebra can judge (Bristow, Tharayil and Alleyne 2006, the lifted system).
+A legged robot does not begin every trial in the same state, as ILC's textbooks assume: how it lifts
+off decides how it lands. The model therefore carries the state at touchdown from stride to stride.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .._typing import Array
+from ..errors import InvalidInput
+from .record import StrideRecord
+from .tape import Gains
+
+
+@dataclass(frozen=True)
+class LiftedModel:
+    """Strides as linear maps of the feedforward u and of the state x at touchdown.
+
+        e_k = e_0 - angle u_k - angle_start x_k,    e'_k = e'_0 - rate u_k - rate_start x_k,
+        x_{k+1} = carry x_k + push u_k,
+
+    all of them differences from one stride. Stacked vectors hold the phase grid sample by sample,
+    all joints of a sample together: `u = feedforward.reshape(-1)` of size samples * joints.
+
+    Attributes:
+        angle: Answer of the joint angles to the feedforward [rad/(N m)], shape (size, size).
+        rate: Answer of the joint velocities [rad/s/(N m)], shape (size, size).
+        angle_start: Answer of the joint angles to the state at touchdown, shape (size, states).
+        rate_start: Answer of the joint velocities to it, shape (size, states).
+        carry: The next touchdown's state by this one's, shape (states, states).
+        push: The next touchdown's state by the feedforward, shape (states, size).
+        gains: Feedback gains that the model is closed with.
+        torque: Feedforward that the gait asks for [N m], shape (samples, joints).
+    """
+
+    angle: Array
+    rate: Array
+    angle_start: Array
+    rate_start: Array
+    carry: Array
+    push: Array
+    gains: Gains
+    torque: Array
+
+    def __post_init__(self) -> None:
+        size, states = self.torque.size, len(self.carry)
+        shapes = {
+            "angle": (size, size),
+            "rate": (size, size),
+            "angle_start": (size, states),
+            "rate_start": (size, states),
+            "carry": (states, states),
+            "push": (states, size),
+        }
+        for name, shape in shapes.items():
+            if getattr(self, name).shape != shape:
+                raise InvalidInput(
+                    f"{name} of shape {getattr(self, name).shape}; a lifted model of {size} "
+                    f"torques and {states} states needs {shape}"
+                )
+
+    @classmethod
+    def with_resets(cls, angle: Array, rate: Array, *, gains: Gains, torque: Array) -> LiftedModel:
+        """A model whose trials all begin in the same state, as in ILC's textbooks."""
+        size = len(angle)
+        start = np.zeros((size, 0))
+        return cls(angle, rate, start, start, np.zeros((0, 0)), start.T, gains, torque)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Samples and joints."""
+        return self.torque.shape[0], self.torque.shape[1]
+
+    @property
+    def within_a_stride(self) -> LiftedModel:
+        """The same model if every stride began in the same state."""
+        return LiftedModel.with_resets(self.angle, self.rate, gains=self.gains, torque=self.torque)
+
+    @property
+    def settled(self) -> LiftedModel:
+        """The model with resets whose one stride is what this one comes to after many.
+
+        Its answer to a feedforward is the one once the touchdown has settled:
+        `angle + angle_start (1 - carry)^-1 push`.
+        """
+        start = np.linalg.solve(np.eye(len(self.carry)) - self.carry, self.push)
+        return LiftedModel.with_resets(
+            self.angle + self.angle_start @ start,
+            self.rate + self.rate_start @ start,
+            gains=self.gains,
+            torque=self.torque,
+        )
+
+    @property
+    def planned(self) -> StrideRecord:
+        """The steady stride without feedforward: what lacks is the torque that the gait asks for.
+
+        As if flight were tracked perfectly, and the robot were the model.
+        """
+        model = self.settled
+        u = self.torque.reshape(-1)
+        return self.record(model.angle @ u, model.rate @ u, np.zeros_like(u))
+
+    def record(self, error: Array, rate: Array, feedforward: Array) -> StrideRecord:
+        """A stride's record from its errors (..., size) and its feedforward (..., size)."""
+        shape = (-1, *self.shape)
+        error, rate = error.reshape(shape), rate.reshape(shape)
+        joints = self.shape[1]
+        feedback = self.gains.proportional[:joints] * error + self.gains.derivative[:joints] * rate
+        return StrideRecord.of(error, rate, feedback, feedforward.reshape(error.shape))
+
+    def stride(self, feedforward: Array, begin: StrideRecord, state: Array) -> StrideRecord:
+        """The strides that follow from feedforwards and states at touchdown, from a known stride.
+
+        Args:
+            feedforward: Feedforwards [N m], shape (n, samples, joints).
+            begin: The stride from which the others differ, of one robot or n.
+            state: How the states at touchdown differ from that stride's, shape (n, states).
+        """
+        change = (feedforward - begin.feedforward).reshape(len(feedforward), -1)
+        error = begin.error.reshape(len(begin.error), -1) - change @ self.angle.T
+        rate = begin.error_rate.reshape(len(begin.error), -1) - change @ self.rate.T
+        error = error - state @ self.angle_start.T
+        rate = rate - state @ self.rate_start.T
+        return self.record(error, rate, feedforward)
+
+    def land(self, feedforward: Array, begin: StrideRecord, state: Array) -> Array:
+        """How the states at the next touchdown differ; arguments of `stride`: (n, states)."""
+        change = (feedforward - begin.feedforward).reshape(len(feedforward), -1)
+        return np.asarray(state @ self.carry.T + change @ self.push.T)
+
+    def delayed(self, samples: int) -> LiftedModel:
+        """The same strides with a feedforward that acts some samples of the grid later."""
+        shift = np.eye(self.torque.size, k=-samples * self.shape[1])
+        return self._through(shift)
+
+    def scaled(self, factor: float) -> LiftedModel:
+        """The same strides with a feedforward that acts more strongly, or less."""
+        return self._through(factor * np.eye(self.torque.size))
+
+    def _through(self, actuator: Array) -> LiftedModel:
+        return replace(
+            self,
+            angle=self.angle @ actuator,
+            rate=self.rate @ actuator,
+            push=self.push @ actuator,
+        )

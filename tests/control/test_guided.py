@@ -1,0 +1,41 @@
+"""The guided robot's derivatives against finite differences of its forward dynamics."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from pronk_pin._typing import Array
+from pronk_pin.control.guided import guided_derivatives
+from pronk_pin.gait import Gait
+from pronk_pin.gait.reintegration import forward_dynamics, guided_rows
+from pronk_pin.robot import NB, Robot
+
+H = 1e-6
+
+
+@pytest.mark.parametrize(
+    ("phase", "contact"), [("stance", "rolling"), ("stance", "point"), ("flight", None)]
+)
+def test_derivatives_are_those_of_the_guided_acceleration(
+    robot: Robot, gaits: list[Gait], phase: str, contact: Literal["rolling", "point"] | None
+) -> None:
+    motion, rows = gaits[1].phase(phase).motion(robot, np.array([0.3])), guided_rows(robot)
+    q, v, tau = motion.q[0], motion.v[0], motion.tau[0]
+    found = guided_derivatives(robot, q, v, tau, contact=contact)
+
+    def acceleration(z: Array) -> Array:
+        moved, faster = q.copy(), v.copy()
+        moved[[0, 2]] += z[:2]
+        moved[NB + 1 :] += z[2:14]
+        faster[rows] += z[14:28]
+        return forward_dynamics(robot, moved, faster, tau + z[28:], contact=contact)[rows]
+
+    steps = H * np.eye(40)
+    expected = np.stack([(acceleration(z) - acceleration(-z)) / (2.0 * H) for z in steps], axis=1)
+    np.testing.assert_allclose(found.a, acceleration(np.zeros(40)), atol=1e-9)
+    np.testing.assert_allclose(found.da_dy, expected[:, :14], atol=1e-5)
+    np.testing.assert_allclose(found.da_dv, expected[:, 14:28], atol=1e-5)
+    np.testing.assert_allclose(found.da_dtau, expected[:, 28:], atol=1e-5)
