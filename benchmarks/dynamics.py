@@ -250,7 +250,6 @@ def cones(samples: int) -> None:
     robot = load_robot("a1")
     motion = load_library("a1").at(0.5).stance.motion(robot, np.linspace(0.0, 1.0, samples))
     state = (motion.q, motion.v, motion.a)
-    free = np.abs(inverse_dynamics(robot, *state).lam.reshape(samples, -1, 3))
     print(f"\n{'friction cones, [us]':<28}{'all':>9}{'QP for':>9}{'feasible':>9}")
     for friction, guide in ((0.6, None), (0.22, None), (0.22, SAGITTAL_GUIDE)):
 
