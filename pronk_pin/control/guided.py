@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 
 from .._typing import Array
-from ..dynamics import Contact, contact_bias, contact_jacobian
+from ..dynamics import Contact, contact_jacobian
 from ..dynamics.derivatives import partials
-from ..gait.reintegration import guided_rows
+from ..gait.reintegration import guided_equations, guided_rows
 from ..robot import NB, Robot
 
 
@@ -119,19 +119,14 @@ def guided_impact(
 def _equations(
     robot: Robot, q: Array, v: Array, tau: Array, contact: Contact | None, rotors: Rotors
 ) -> tuple[Array, Array]:
-    """Matrix and right-hand side of eq. (5) on the free rows."""
-    rows, joints = guided_rows(robot), _joints(robot)
-    mass = _mass(robot, q, rotors)
-    force = -pin.nonLinearEffects(robot.model, robot.data, q, v)[rows]
-    force -= rotors.damping * joints * v[rows]
-    force[joints == 1.0] += tau
-    if contact is None:
-        return mass, np.asarray(force)
-    jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
-    bias = contact_bias(robot, q, v, contact=contact)
-    corner = np.zeros((len(jacobian), len(jacobian)))
-    kkt = np.block([[mass, -jacobian.T], [jacobian, corner]])
-    return kkt, np.concatenate([force, -bias])
+    """Matrix and right-hand side of eq. (5) on the free rows, with what the joints add."""
+    feet = () if contact is None else robot.legs
+    kkt, right = guided_equations(robot, q, v, tau, contact=contact or "rolling", feet=feet)
+    joints = _joints(robot)
+    free = np.arange(len(joints))
+    kkt[free, free] += rotors.armature * joints
+    right[free] -= rotors.damping * joints * v[guided_rows(robot)]
+    return kkt, right
 
 
 def _mass(robot: Robot, q: Array, rotors: Rotors) -> Array:

@@ -14,6 +14,7 @@ from scipy.interpolate import make_interp_spline
 
 from .._state import as_array, as_one, as_state, leg_indices
 from .._typing import Array
+from ..energetics import kinetic_energy, potential_energy
 from ..errors import IntegrationFailed, InvalidInput
 from ..kinematics import foot_positions
 from ..kinematics.contacts import Contact, contact_radius, jacobian_at
@@ -209,7 +210,7 @@ def _integrate(
     solved = [
         problem.accelerations(*state) for state in zip(positions, velocities, torques, strict=True)
     ]
-    energy = np.array([_energy(robot, *state) for state in zip(positions, velocities, strict=True)])
+    energy = kinetic_energy(robot, positions, velocities) + potential_energy(robot, positions)
     return PhaseSimulation(
         t=times,
         q=positions,
@@ -229,11 +230,6 @@ def _normalized(q: Array) -> Array:
     q = q.copy()
     q[3:7] /= np.linalg.norm(q[3:7])
     return q
-
-
-def _energy(robot: Robot, q: Array, v: Array) -> float:
-    """Kinetic and potential energy [J]."""
-    return float(pin.computeMechanicalEnergy(robot.model, robot.data, q, v))
 
 
 def _foot_drift(problem: _PhaseProblem, q: Array) -> float:

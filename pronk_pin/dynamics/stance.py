@@ -106,7 +106,7 @@ class PointStance:
     """
 
     def __init__(self, robot: Robot, legs: tuple[int, ...]) -> None:
-        self._robot, self._size = robot, 3 * len(legs)
+        self._size = 3 * len(legs)
         self._model = model = robot.model
         self._data = data = model.createData()
         self._settings = pin.ProximalSettings(1e-12, 0.0, 1)  # no damping, so one pass is exact

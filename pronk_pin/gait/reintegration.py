@@ -53,6 +53,33 @@ def guided_rows(robot: Robot, base: Base = "locked") -> IntArray:
     return np.array([*free, *range(NB, robot.nv)], dtype=np.intp)
 
 
+def guided_equations(
+    robot: Robot,
+    q: Array,
+    v: Array,
+    tau: Array,
+    *,
+    contact: Contact = "rolling",
+    feet: Sequence[str] = (),
+    base: Base = "locked",
+) -> tuple[Array, Array]:
+    """Matrix and right-hand side of eq. (5) on the rows that the guide leaves free, (2) in flight.
+
+    Arguments are those of `forward_dynamics`. The unknowns are the accelerations of the free rows,
+    and the contact forces of the feet.
+    """
+    rows = guided_rows(robot, base)
+    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14 or 15, ...)
+    force = np.concatenate([np.zeros(NB), tau])
+    force = (force - pin.nonLinearEffects(robot.model, robot.data, q, v))[rows]
+    if not feet:
+        return mass, force
+    jacobian = contact_jacobian(robot, q, feet=feet, contact=contact)[:, rows]
+    bias = contact_bias(robot, q, v, feet=feet, contact=contact)
+    corner = np.zeros((len(jacobian), len(jacobian)))
+    return np.block([[mass, -jacobian.T], [jacobian, corner]]), np.concatenate([force, -bias])
+
+
 def forward_dynamics(
     robot: Robot,
     q: Array,
@@ -77,19 +104,9 @@ def forward_dynamics(
     Returns:
         Acceleration, shape (18,), zero where the guide holds the trunk.
     """
-    rows = guided_rows(robot, base)
-    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14 or 15, ...)
-    force = np.concatenate([np.zeros(NB), tau])
-    force = (force - pin.nonLinearEffects(robot.model, robot.data, q, v))[rows]
-    a = np.zeros(robot.nv)
-    if not feet:
-        a[rows] = np.linalg.solve(mass, force)
-        return a
-    jacobian = contact_jacobian(robot, q, feet=feet, contact=contact)[:, rows]
-    bias = contact_bias(robot, q, v, feet=feet, contact=contact)
-    corner = np.zeros((len(jacobian), len(jacobian)))
-    kkt = np.block([[mass, -jacobian.T], [jacobian, corner]])
-    a[rows] = np.linalg.solve(kkt, np.concatenate([force, -bias]))[: len(rows)]
+    rows, a = guided_rows(robot, base), np.zeros(robot.nv)
+    kkt, right = guided_equations(robot, q, v, tau, contact=contact, feet=feet, base=base)
+    a[rows] = np.linalg.solve(kkt, right)[: len(rows)]
     return a
 
 
