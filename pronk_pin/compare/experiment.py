@@ -146,7 +146,7 @@ def run_cell(
 
 def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     """The torque library learned in a simulation: means over its steady strides (section III.B)."""
-    torque = steady(strides)["feedforward"].interp(phase=phase_grid())
+    torque = steady(strides)["feedforward"].interp(phase=phase_grid(), method="cubic")
     torque = torque.transpose("speed", "stride", "part", "phase", "joint")
     return TorqueLibrary.from_strides(strides["speed"].to_numpy(), torque.to_numpy())
 

@@ -80,14 +80,24 @@ class ControllerSpec:
         return self.law, self.flight_law
 
 
+FLIGHT_LAW = PDTypeILC(
+    leak=0.02,
+    delta=0.04,
+    # The error's rate would learn the vibration of the leg after lift-off.
+    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    filter=ZeroPhaseFilter.butterworth(3, 0.04),
+)
+"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
+
 CONTROLLERS = {
     spec.name: spec
     for spec in (
         ControllerSpec("pd"),
-        ControllerSpec("ilc", law=PDTypeILC()),
+        ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW),
         ControllerSpec("model", source="model"),
         ControllerSpec("library", source="library"),
-        ControllerSpec("model+ilc", source="model", law=PDTypeILC()),
+        ControllerSpec("model+ilc", source="model", law=PDTypeILC(), flight_law=FLIGHT_LAW),
+        ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
