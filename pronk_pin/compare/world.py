@@ -13,14 +13,15 @@ from contextlib import contextmanager
 import mujoco
 import mujoco.rollout
 import numpy as np
-import pinocchio as pin
 
 from .._typing import Array, BoolArray, IntArray
 from .._urdf import mujoco_spec
 from ..robot import Robot
+from .foreign import mjcf_spec
+from .ground import add_ground, name_feet
 from .scenario import Scenario
+from .trunk import load_trunk
 
-_FLOOR = "floor"
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
@@ -28,12 +29,13 @@ def build_model(robot: Robot, scenario: Scenario, *, free: bool = False) -> mujo
     """Compile the robot in its world.
 
     Args:
-        robot: The robot, whose URDF is used.
-        scenario: What the world adds to the URDF.
+        robot: The robot, whose URDF is used if the scenario names no MJCF.
+        scenario: What the world adds to that.
         free: Leave the trunk its six degrees of freedom instead of x and z only.
     """
-    spec = mujoco_spec(robot)
+    spec = mjcf_spec(robot, scenario.mjcf) if scenario.mjcf else mujoco_spec(robot)
     spec.option.timestep = scenario.timestep
+    spec.option.gravity = scenario.gravity_vector
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -49,87 +51,27 @@ def build_model(robot: Robot, scenario: Scenario, *, free: bool = False) -> mujo
             spec.delete(joint)
         for name, axis in (("x", [1, 0, 0]), ("z", [0, 0, 1])):
             trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    _add_payload(trunk, scenario)
+    load_trunk(trunk, scenario)
     _add_motors(spec, robot, scenario)
-    _name_feet(spec, robot)
-    _add_ground(spec, robot, scenario)
+    name_feet(spec, robot)
+    add_ground(spec, robot, scenario)
     return spec.compile()
 
 
-def _add_payload(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
-    """Merge the payload into the trunk's inertia (a body of its own would be fused wrongly)."""
-    if scenario.payload == 0.0:
-        return
-    flat = np.zeros(9)
-    mujoco.mju_quat2Mat(flat, np.array(trunk.iquat))
-    rotation = flat.reshape(3, 3)
-    inertia = rotation @ np.diag(trunk.inertia) @ rotation.T
-    own = pin.Inertia(float(trunk.mass), np.array(trunk.ipos), inertia)
-    point = pin.Inertia(scenario.payload, np.array(scenario.payload_position), np.zeros((3, 3)))
-    both = own + point
-    principal, axes = np.linalg.eigh(both.inertia)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, axes.ravel())
-    trunk.mass, trunk.ipos = both.mass, both.lever
-    trunk.inertia, trunk.iquat = principal, quaternion
-
-
 def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
-    """A torque motor at every joint, with the friction and the rotor that the URDF leaves out."""
+    """A torque motor at every joint; rotor and friction come on top of the joint's own."""
     for name in robot.urdf_joint_names:
         joint = spec.joint(name)
-        joint.armature = scenario.armature
-        joint.damping = [scenario.damping, 0, 0]
-        joint.frictionloss = scenario.coulomb
+        joint.armature += scenario.armature
+        linear, *higher = joint.damping
+        joint.damping = [linear + scenario.damping, *higher]
+        joint.frictionloss += scenario.coulomb
         # The default time constant of 0.02 s would smear Coulomb friction into a damper.
         joint.solref_friction = [0.002, 1]
         joint.actfrclimited = False  # the limit is the controller's business
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.gainprm = [scenario.torque_constant] + [0] * 9
         motor.biasprm = [0] * 10
-
-
-def _name_feet(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """The sphere that each foot stands on; one of our own where the URDF has a mesh instead."""
-    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    for leg, foot, foot_id in zip(robot.legs, robot.foot_names, robot.foot_ids, strict=True):
-        calf = spec.joint(robot.spec.leg_joints(leg)[-1]).parent
-        centre = np.array(robot.model.frames[foot_id].placement.translation)
-        geom = next((geom for geom in calf.geoms if geom.type == sphere), None)
-        if geom is None:
-            geom = calf.add_geom(type=sphere, pos=centre, size=[robot.foot_radius, 0, 0])
-        geom.name = foot
-
-
-def _add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
-    """The floor, and sensors of the force between it and each foot."""
-    contact = {
-        "solref": [scenario.ground_time_constant, 1],
-        "friction": [scenario.ground_friction, 0.005, 0.0001],
-        "condim": 3,
-    }
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(
-        name=_FLOOR, type=plane, size=[0, 0, 1], contype=1, conaffinity=0, **contact
-    )
-    for geom in spec.geoms:
-        if geom.name != _FLOOR:
-            geom.contype, geom.conaffinity = 0, 1  # the robot meets the floor, not itself
-            geom.solref, geom.friction, geom.condim = contact.values()
-    for foot in robot.foot_names:
-        force = mujoco.mjtConDataField.mjCONDATA_FORCE
-        spec.add_sensor(
-            name=foot,
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_GEOM,
-            objname=foot,
-            reftype=mujoco.mjtObj.mjOBJ_GEOM,
-            refname=_FLOOR,
-            # data fields, reduction (3: net force in the world frame), number of contacts
-            intprm=[1 << int(force), 3, 1],
-        )
 
 
 @contextmanager
