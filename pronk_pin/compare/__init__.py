@@ -7,7 +7,7 @@ from .mismatch import KNOWN, MISMATCHES, Mismatch
 from .results import Results, default_folder
 from .run import run_experiment
 from .scenario import SCENARIOS, Scenario, load_scenario, random_scenarios
-from .sensors import Reading, Sensors, SensorSuite
+from .sensors import Sensors, SensorSuite
 from .simulate import Schedule, Simulation
 from .world import World, build_model
 
@@ -19,7 +19,6 @@ __all__ = [
     "Cell",
     "Experiment",
     "Mismatch",
-    "Reading",
     "Results",
     "Scenario",
     "Schedule",

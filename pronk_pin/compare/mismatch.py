@@ -82,7 +82,7 @@ KNOWN = {
     "steps": Mismatch("greatest height of steps", 0.01, "m", _of("step_height")),
     "gravity": Mismatch("gravitational acceleration", 8.8, "m/s^2", _of("gravity")),
     "delay": Mismatch("delay of the motors", 0.004, "s", _of("delay")),
-    "slow-motors": Mismatch("no-load speed of the joints", 21.0, "rad/s", _slow),
+    "slow-motors": Mismatch("no-load speed of the joints", 12.0, "rad/s", _slow),
     "noise": Mismatch(
         "noise and bias of the sensors, over those of `NOISE`",
         1.0,

@@ -1,4 +1,4 @@
-"""What lies between a command and its torque: a delay, and the motors' speed-torque curve."""
+"""What acts on a robot tick by tick: motors with a delay and a speed-torque curve, and pushes."""
 
 from __future__ import annotations
 
@@ -50,10 +50,15 @@ class Motors:
 
 
 def push_force(scenario: Scenario, time: Array) -> Array:
-    """Force on the trunk's origin at times (m,) from the simulation's beginning [N], (m, 3)."""
+    """Force on the trunk's centre of mass, world frame [N], shape (..., 3).
+
+    Args:
+        scenario: Its pushes.
+        time: From the simulation's beginning [s], shape (...).
+    """
     dt = scenario.timestep
     period = max(round(scenario.push_period / dt), 1)
     lasts = max(round(scenario.push_duration / dt), 1)  # ticks
     number, tick = np.divmod(np.rint(time / dt).astype(np.intp), period)
     sign = np.where(number % 2 == 1, 1.0, -1.0) * ((number >= 1) & (tick < lasts))
-    return np.asarray(sign[:, None] * np.array(scenario.push_impulse) / (lasts * dt))
+    return np.asarray(sign[..., None] * np.array(scenario.push_impulse) / (lasts * dt))

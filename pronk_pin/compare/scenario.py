@@ -60,7 +60,8 @@ class Scenario:
         step_height: Greatest height of the steps across the way [m].
         step_length: Length of a step along the way [m].
         gravity: Gravitational acceleration [m/s^2].
-        push_impulse: Impulse of a push on the trunk, turned around from push to push [N s].
+        push_impulse: Impulse of a push on the trunk's centre of mass, turned around from push to
+            push [N s].
         push_period: Time between pushes; the first comes after so long, start-up included [s].
         push_duration: How long a push lasts [s].
         seed: Draws the heights of the steps.
@@ -140,14 +141,9 @@ class Scenario:
 
     @property
     def affine(self) -> bool:
-        """Whether a whole phase can be played at once: nothing between the tape and the motors
-        but what is affine in the joints' angles and velocities."""
-        return (
-            self.delay == 0.0
-            and self.no_load_speed == math.inf
-            and self.sensors.perfect
-            and not self.pushes
-        )
+        """Whether servos can play a whole phase at once, with `World.play`: nothing comes between
+        the tape and the torque but what is affine in the joints' angles and velocities."""
+        return self.delay == 0.0 and self.no_load_speed == math.inf and self.sensors.perfect
 
     @property
     def pushes(self) -> bool:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import astuple, dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from .._typing import Array, IntArray
 from ..errors import InvalidInput
+from ..robot import NL
 
 
 @dataclass(frozen=True)
@@ -53,65 +53,58 @@ class Sensors:
         return replace(self, **{n: factor * getattr(self, n) for n in self.__dataclass_fields__})
 
 
-class Reading(NamedTuple):
-    """What m robots measure at one instant, or what is true of them then.
-
-    The trunk's axes point forward, left and up.
-    """
-
-    joints: Array
-    """Joint angles [rad], shape (m, 12)."""
-    joint_rates: Array
-    """Joint velocities [rad/s], shape (m, 12)."""
-    force: Array
-    """Ground's force on each foot, world frame [N], shape (m, 4, 3)."""
-    angular_velocity: Array
-    """Of the trunk, in the trunk's frame [rad/s], shape (m, 3)."""
-    specific_force: Array
-    """Acceleration of the trunk's origin less gravity, in the trunk's frame [m/s^2], shape (m, 3):
-    about (0, 0, 9.81) at rest, zero in free fall."""
-
-
 class SensorSuite:
     """The sensors of n robots: biases that stay, noise that is drawn at each reading.
 
+    Each robot has a stream of its own, so that what one measures does not depend on how often the
+    others are asked.
+
     Args:
-        sensors: How bad they are.
+        sensors: How far they are from the truth.
         n: Number of robots.
-        rng: Source of biases and noise. Each robot has a stream of its own, spawned from it, so
-            that what one robot measures does not depend on how often the others are asked.
+        rng: Source of the streams, which are spawned from it.
     """
 
     def __init__(self, sensors: Sensors, n: int, rng: np.random.Generator) -> None:
         self.sensors = sensors
         self._streams = rng.spawn(n)
-        self._bias = np.stack([stream.standard_normal(18) for stream in self._streams])
-        self._bias *= np.repeat(
-            [sensors.encoder_bias, sensors.gyro_bias, sensors.accelerometer_bias], [12, 3, 3]
-        )
-        self._scale = np.repeat(
-            [
-                sensors.encoder_noise,
-                sensors.rate_noise,
-                sensors.gyro_noise,
-                sensors.accelerometer_noise,
-                sensors.force_noise,
-            ],
-            [12, 12, 3, 3, 12],
+        biases = np.stack([stream.standard_normal(NL + 6) for stream in self._streams])
+        self._encoder_bias = sensors.encoder_bias * biases[:, :NL]
+        scale = np.repeat([sensors.gyro_bias, sensors.accelerometer_bias], 3)
+        self._imu_bias = scale * biases[:, NL:]
+
+    def encoders(self, rows: IntArray, joints: Array, rates: Array) -> tuple[Array, Array]:
+        """What some robots' encoders say of their joints at one tick.
+
+        Args:
+            rows: Which robots, shape (m,).
+            joints: True joint angles [rad], shape (m, 12).
+            rates: True joint velocities [rad/s], shape (m, 12).
+        """
+        angle, rate = self._noise(rows, (2, NL)).swapaxes(0, 1)
+        angle = self.sensors.encoder_noise * angle + self._encoder_bias[rows]
+        return joints + angle, rates + self.sensors.rate_noise * rate
+
+    def feet(self, rows: IntArray, force: Array) -> Array:
+        """What they feel of the ground's forces on their feet [N], shape (m, ..., 3)."""
+        return force + self.sensors.force_noise * self._noise(rows, force.shape[1:])
+
+    def imu(self, rows: IntArray, turning: Array, specific_force: Array) -> tuple[Array, Array]:
+        """What their IMUs say over some ticks, in the trunk's frame.
+
+        Args:
+            rows: Which robots, shape (m,).
+            turning: True angular velocity of the trunk [rad/s], shape (m, ticks, 3).
+            specific_force: True acceleration of its origin less gravity [m/s^2], shape
+                (m, ticks, 3): (0, 0, 9.81) at rest, zero in free fall.
+        """
+        noise = self._noise(rows, (2, *turning.shape[1:])).swapaxes(0, 1)
+        gyro, accelerometer = noise
+        bias = self._imu_bias[rows][:, None]
+        return (
+            turning + self.sensors.gyro_noise * gyro + bias[..., :3],
+            specific_force + self.sensors.accelerometer_noise * accelerometer + bias[..., 3:],
         )
 
-    def read(self, rows: IntArray, truth: Reading) -> Reading:
-        """What some of the robots measure of the truth."""
-        if self.sensors.perfect:
-            return truth
-        noise = np.stack([self._streams[row].standard_normal(len(self._scale)) for row in rows])
-        noise *= self._scale
-        angle, rate, gyro, accelerometer, force = np.split(noise, [12, 24, 27, 30], axis=1)
-        bias = self._bias[rows]
-        return Reading(
-            joints=truth.joints + angle + bias[:, :12],
-            joint_rates=truth.joint_rates + rate,
-            force=truth.force + force.reshape(truth.force.shape),
-            angular_velocity=truth.angular_velocity + gyro + bias[:, 12:15],
-            specific_force=truth.specific_force + accelerometer + bias[:, 15:],
-        )
+    def _noise(self, rows: IntArray, shape: tuple[int, ...]) -> Array:
+        return np.stack([self._streams[row].standard_normal(shape) for row in rows])

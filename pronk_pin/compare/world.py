@@ -21,10 +21,12 @@ from ..control import Gains
 from ..robot import Robot
 from .foreign import mjcf_spec
 from .ground import add_ground, name_feet
+from .motors import push_force
 from .scenario import Scenario
 from .trunk import load_trunk
 
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_CONTROL, _PUSHED = mujoco.mjtState.mjSTATE_CTRL, mujoco.mjtState.mjSTATE_XFRC_APPLIED
 
 
 def build_model(
@@ -159,6 +161,10 @@ class World:
         self._base_rate = np.array([1 + nq + model.joint(name).dofadr[0] for name in ("x", "z")])
         address = [model.sensor(name).adr[0] for name in robot.foot_names]
         self._force = np.array(address)[:, None] + np.arange(3)
+        # Forces on the bodies come after the motors' controls: force and moment, in the world.
+        self._control = int(_CONTROL | _PUSHED if scenario.pushes else _CONTROL)
+        trunk = model.body(robot.spec.base_link).id
+        self._push = model.nu + 6 * trunk + np.arange(3)
         self._state = np.zeros((n, mujoco.mj_stateSize(model, _FULL)))
         self._warmstart = np.zeros((n, model.nv))
         self.force = np.zeros((n, *self._force.shape))
@@ -193,8 +199,11 @@ class World:
         m, ticks = control.shape[:2]
         path = np.empty((m, ticks + 1, self._state.shape[1]))
         path[:, 0] = self._state[rows]
-        told = np.empty((m, ticks, self.model.nu))
+        told = np.zeros((m, ticks, mujoco.mj_stateSize(self.model, self._control)))
         told[..., self._ctrl] = control
+        if self.scenario.pushes:
+            time = path[:, :1, 0] + self.scenario.timestep * np.arange(ticks)  # (m, ticks)
+            told[..., self._push] = push_force(self.scenario, time)
         states = np.empty((m, ticks, path.shape[2]))
         sensors = np.empty((m, ticks, self.model.nsensordata))
         self._rollout.rollout(
@@ -202,6 +211,7 @@ class World:
             self._data,
             path[:, 0].copy(),
             told,
+            control_spec=self._control,
             skip_checks=True,
             nstep=ticks,
             initial_warmstart=self._warmstart[rows],

@@ -223,7 +223,8 @@ class Controller:
 
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
         """Flight tapes for robots that have just finished a stance, and the stance's record."""
-        record = self._record(0, rows, log)
+        record = self.record(0, rows, log)
+        self._last[0].put(rows, record)
         speed = self._estimator.update(rows, log)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         share, rate = self._turn[rows] * turn, self._turn_rate[rows] * turn  # (m, ticks)
@@ -245,7 +246,8 @@ class Controller:
             duration: How long their strides lasted [s], shape (len(rows),).
             upright: Whether they have not fallen, shape (len(rows),); all by default.
         """
-        record = self._record(1, rows, log)
+        record = self.record(1, rows, log)
+        self._last[1].put(rows, record)
         relative = duration / (self._stance.duration[rows] + self._flight.duration[rows])
         reasons = []
         for last in self._last:
@@ -260,14 +262,17 @@ class Controller:
         phase = (self._stance, self._flight)[part].phase[rows]
         return resample(self.feedforward[rows, part], phase * (SAMPLES - 1))
 
-    def _record(self, part: int, rows: IntArray, log: PhaseLog) -> StrideRecord:
-        """What was measured in a part of the stride, aligned on t / T of the reference."""
+    def record(self, part: int, rows: IntArray, log: PhaseLog) -> StrideRecord:
+        """The record of what was measured in a part of the stride (an index into `PARTS`).
+
+        Aligned on t / T of the reference.
+        """
         reference = (self._stance, self._flight)[part]
         index = log.index(phase_grid(), reference.duration[rows] / self._timestep)
         ticks = slice(min(reference.position.shape[1], log.joints.shape[1]))
         error = reference.position[rows, ticks] - log.joints[:, ticks]
         rate = reference.velocity[rows, ticks] - log.joint_rates[:, ticks]
-        record = StrideRecord(
+        return StrideRecord(
             error=resample(error, index),
             error_rate=resample(rate, index),
             feedback=resample(log.feedback, index),
@@ -278,8 +283,6 @@ class Controller:
             upright=np.ones(len(rows), dtype=bool),
             robot=rows,
         )
-        self._last[part].put(rows, record)
-        return record
 
     def _learn(self, rows: IntArray) -> None:
         """Update the feedforward of some robots from their last stride."""

@@ -129,13 +129,13 @@ def test_no_sampled_world_and_no_negative_seed(n: int, seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["nominal", "payload-front", "slope", "steps", "soft-ground", "gravity", "random-0-0"]
+    "name", ["nominal", "payload-front", "slope", "steps", "push", "push-side", "random-0-0"]
 )
 def test_what_the_compiled_model_expresses_is_affine(name: str) -> None:
     assert load_scenario(name).affine
 
 
-@pytest.mark.parametrize("name", ["delay", "noise", "push", "push-side", "slow-motors"])
+@pytest.mark.parametrize("name", ["delay", "noise", "slow-motors"])
 def test_what_lies_between_command_and_torque_is_not_affine(name: str) -> None:
     assert not load_scenario(name).affine
     assert not load_scenario(f"{name}+payload").affine
