@@ -94,6 +94,7 @@ class TickLog:
             self.missing[rows, ticks],
             length,
             felt,
+            self.force[rows, ticks, :, 2].sum(axis=-1),
         )
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:

@@ -34,9 +34,6 @@ _EXPECTED_TOUCHDOWN = 0.9
 _CHUNK = 20
 """Ticks that are played in one go from then on; what comes after a touchdown is thrown away."""
 
-TOUCHDOWN_LOAD = 0.1
-"""Share of the weight on the feet that counts as a touchdown."""
-
 _FALLEN = 0.6
 """Trunk height, over that of the gait's lowest point, below which a robot has fallen."""
 
@@ -126,7 +123,7 @@ class Simulation:
         # What the robots believe: the truth itself, where they compute nothing of their own.
         self._seen = self._log if self._chunked else TickLog(n, self.controller.max_ticks)
         self._late = spec.touchdown_ticks
-        self._load = TOUCHDOWN_LOAD * robot.mass * robot.gravity
+        self._load = spec.contact.touchdown * robot.mass * robot.gravity
         flight = np.array([gait.flight.duration for gait in gaits])
         self._earliest = np.round(_EARLIEST_TOUCHDOWN * flight / dt).astype(np.intp)
         self._expected = np.round(_EXPECTED_TOUCHDOWN * flight / dt).astype(np.intp)
@@ -271,7 +268,8 @@ class Simulation:
     ) -> IntArray:
         """Ticks after which the phases end, beyond the motion where they do not end in it.
 
-        Robots that fall in it, or that miss their touchdown, are noted as such.
+        Robots that fall in it are noted as such. One that misses its touchdown has not fallen: its
+        flight ends late, with the legs held out, and the next stance begins.
         """
         count = tick + 1 + np.arange(motion.base.shape[1])  # ticks played after each step
         over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
@@ -282,10 +280,7 @@ class Simulation:
         ended = over.any(axis=1)
         ends[ended] = count[np.argmax(over[ended], axis=1)]
         too_low = motion.base[..., 1] < self._floor[rows, None]
-        fallen = (too_low & (count <= ends[:, None])).any(axis=1)
-        if airborne:
-            fallen |= ends == length
-        self.upright[rows] &= ~fallen
+        self.upright[rows] &= ~(too_low & (count <= ends[:, None])).any(axis=1)
         return ends
 
     def _restart_broken(self, rows: IntArray) -> None:

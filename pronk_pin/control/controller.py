@@ -17,6 +17,7 @@ from ..errors import InvalidInput
 from ..gait import Gait, GaitPhase
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
+from .contacts import ContactDetector
 from .estimation import SpeedEstimator
 from .filters import ZeroPhaseFilter
 from .learning import (
@@ -54,6 +55,7 @@ class ControllerSpec:
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
         selection: Strides worth learning from.
+        contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
             contact sensor is one late, and the contact began between two ticks.
@@ -66,6 +68,7 @@ class ControllerSpec:
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
     selection: StrideSelection = field(default_factory=StrideSelection)
+    contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
     touchdown_ticks: int = 2
 
@@ -172,6 +175,7 @@ class Controller:
         self._timestep = timestep
         self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
         self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
+        self._stood = np.zeros(n, dtype=np.intp)  # why a stance was none, index into `SKIPPED`
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
@@ -225,6 +229,7 @@ class Controller:
         """Flight tapes for robots that have just finished a stance, and the stance's record."""
         record = self.record(0, rows, log)
         self._last[0].put(rows, record)
+        self._stood[rows] = self._judge_contact(log)
         speed = self._estimator.update(rows, log)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         share, rate = self._turn[rows] * turn, self._turn_rate[rows] * turn  # (m, ticks)
@@ -254,8 +259,19 @@ class Controller:
             last.relative_duration[rows] = relative
             last.upright[rows] = True if upright is None else upright
             reasons.append(self.spec.selection.skipped(last.take(rows)))
-        self.skipped[rows] = np.where(reasons[0] > 0, reasons[0], reasons[1])
+        reasons.append(self._stood[rows])
+        self.skipped[rows] = np.select([reason > 0 for reason in reasons], reasons, default=0)
         return record
+
+    def _judge_contact(self, log: PhaseLog) -> IntArray:
+        """Why stances were none, as indices into `SKIPPED`, shape (m,)."""
+        if log.load is None:
+            return np.zeros(len(log.length), dtype=np.intp)
+        detector = self.spec.contact
+        stance = detector.stance(log.load / (self.robot.mass * self.robot.gravity), log.length)
+        wrong = [detector.false_touchdown(stance, log.length), detector.contact_lost(stance)]
+        names = [SKIPPED.index("false touchdown"), SKIPPED.index("contact lost")]
+        return np.asarray(np.select(wrong, names, default=0), dtype=np.intp)
 
     def _played(self, part: int, rows: IntArray) -> Array:
         """The feedforward at the ticks of a part, shape (m, ticks, 12)."""

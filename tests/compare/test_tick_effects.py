@@ -84,7 +84,7 @@ def test_the_push_of_a_simulation_speeds_it_up_by_its_impulse(build: Build, robo
 
         world.advance = spy  # type: ignore[method-assign]
         simulation.run()
-        seen.append(dict((round(time * 1000), rate) for time, rate in rates))
+        seen.append({round(time * 1000): rate for time, rate in rates})
     gained = seen[1][701] - seen[0][701]
     assert seen[1][700] == seen[0][700]
     # The legs hang on the trunk by their joints: at first it moves a little more than the whole.

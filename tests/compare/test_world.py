@@ -11,7 +11,6 @@ import pytest
 
 from pronk_pin._typing import Array
 from pronk_pin.compare import Scenario, World, build_model, load_scenario
-from pronk_pin.compare.simulate import TOUCHDOWN_LOAD
 from pronk_pin.compare.world import finite, without_warnings
 from pronk_pin.control import Gains, load_controller
 from pronk_pin.conventions import to_mujoco
@@ -301,7 +300,8 @@ def test_a_touchdown_is_felt_within_the_ticks_that_the_controller_reckons_with(
         clearance.append(feet[..., 2].min(axis=1) - robot.foot_radius)
         load.append(world.force[..., 2].sum(axis=1))
         world.step(Gains().proportional * (standing - world.joints))
-    felt = np.argmax(np.array(load) > TOUCHDOWN_LOAD * robot.mass * robot.gravity, axis=0)
+    threshold = load_controller("pd").contact.touchdown * robot.mass * robot.gravity
+    felt = np.argmax(np.array(load) > threshold, axis=0)
     for height, tick in zip(np.array(clearance).T, felt, strict=True):
         below = int(np.argmax(height < 0.0))
         contact = below - height[below] / (height[below] - height[below - 1])
