@@ -7,7 +7,9 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -18,6 +20,7 @@ from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
 from ..gait import SPEEDS, load_library
 from ..robot import load_robot
+from .foreign import mjcf_spec
 from .metrics import steady
 from .scenario import load_scenario
 from .simulate import Progress, Schedule, Simulation
@@ -34,9 +37,13 @@ class Experiment:
         robot: Short name of the robot.
         speeds: Desired speeds [m/s].
         controllers: Short names of the controllers: any of `control.CONTROLLERS`.
-        scenarios: Short names of the worlds: ideal, nominal, payload, weak-motors, soft-ground.
+        scenarios: Names of the worlds, composed with "+", values with "=": nominal, ideal,
+            payload=2+slope, random-0-3; see `compare.scenario`.
         seeds: Seeds of the scatter at the start.
         base: How the trunk moves: "locked" to x and z.
+        world: MJCF of the robot, with the same joint names, that stands in for its URDF in the
+            simulation; see `compare.foreign`. The scenarios add to what is in it: "ideal" takes it
+            as it is.
         schedule: What happens when.
     """
 
@@ -46,11 +53,14 @@ class Experiment:
     scenarios: tuple[str, ...] = ("nominal",)
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
+    world: str = ""
     schedule: Schedule = field(default_factory=Schedule)
 
     def __post_init__(self) -> None:
-        load_robot(self.robot)
+        robot = load_robot(self.robot)
         library = load_library(self.robot)
+        names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
+        object.__setattr__(self, "scenarios", names)
         for name in ("speeds", "controllers", "scenarios", "seeds"):
             values = tuple(getattr(self, name))
             object.__setattr__(self, name, values)  # a list would not equal what is read back
@@ -60,12 +70,13 @@ class Experiment:
             library.at(speed)
         for controller in self.controllers:
             load_controller(controller)
-        for scenario in self.scenarios:
-            load_scenario(scenario)
         if min(self.seeds) < 0:
             raise InvalidInput("seeds must not be negative")
         if self.base != "locked":
             raise InvalidInput(f"base '{self.base}' is not available; the base can be: locked")
+        if self.world:
+            mjcf_spec(robot, self.world)
+            object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
         object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
 
     def cells(self) -> tuple[Cell, ...]:
@@ -75,7 +86,16 @@ class Experiment:
             controllers = ["ilc", *(c for c in controllers if c not in ("ilc", "library"))]
             controllers.append("library")
         return tuple(
-            Cell(self.robot, self.speeds, controller, scenario, seed, self.base, self.schedule)
+            Cell(
+                self.robot,
+                self.speeds,
+                controller,
+                scenario,
+                seed,
+                self.base,
+                self.world,
+                self.schedule,
+            )
             for controller in controllers
             for scenario in self.scenarios
             for seed in self.seeds
@@ -92,6 +112,7 @@ class Cell:
     scenario: str
     seed: int
     base: str
+    world: str
     schedule: Schedule
 
     @property
@@ -126,7 +147,7 @@ def run_cell(
     Returns:
         The strides: see `compare.strides`.
     """
-    robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario)
+    robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.world)
     library, spec = load_library(cell.robot), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]
     # One stream a seed, the same for every controller: they start from the same postures.
@@ -164,7 +185,8 @@ def _feedforward(spec: ControllerSpec, cell: Cell, practised: xr.Dataset | None)
 
 
 def _attributes(cell: Cell) -> dict[str, str | int | float]:
-    scenario = dataclasses.asdict(load_scenario(cell.scenario))
+    scenario = dataclasses.asdict(load_scenario(cell.scenario, mjcf=cell.world))
+    world = hashlib.sha256(Path(cell.world).read_bytes()).hexdigest() if cell.world else ""
     return {
         "robot": cell.robot,
         "base": cell.base,
@@ -172,5 +194,7 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "controller": cell.controller,
         "seed": cell.seed,
         "scenario_parameters": repr(scenario),
+        "world": cell.world,
+        "world_sha256": world,
         "timestep": scenario["timestep"],
     }

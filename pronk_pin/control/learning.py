@@ -27,7 +27,10 @@ class LearningLaw(Protocol):
         ...
 
 
-SKIPPED = ("", "not finite", "fallen", "too short", "too long", "duration unknown")
+SKIPPED = (
+    *("", "not finite", "fallen", "too short", "too long", "duration unknown"),
+    *("false touchdown", "contact lost"),
+)
 """Why nothing is learned from a stride; the first where nothing is wrong with it."""
 
 
@@ -55,7 +58,7 @@ class StrideSelection:
             duration > self.longest,
             np.isnan(duration),
         ]
-        return np.asarray(np.select(checks, range(1, len(SKIPPED)), default=0), dtype=np.intp)
+        return np.asarray(np.select(checks, range(1, len(checks) + 1), default=0), dtype=np.intp)
 
     def usable(self, record: StrideRecord) -> BoolArray:
         """Which robots' strides are, shape (n,)."""

@@ -29,6 +29,7 @@ class PhaseLog:
             (n, ticks, 12).
         length: Ticks that the phase lasted; later ones hold nothing of it, shape (n,).
         felt: Tick at which its beginning was felt: those before were played on the tape before.
+        load: Vertical force on all feet [N], shape (n, ticks); None where nothing feels it.
     """
 
     joints: Array
@@ -38,6 +39,7 @@ class PhaseLog:
     missing: Array
     length: IntArray
     felt: int = 0
+    load: Array | None = None
 
     def index(self, s: Array, ticks: Array | None = None) -> Array:
         """Fractional ticks at which phases s (m,) were measured, shape (n, m).
