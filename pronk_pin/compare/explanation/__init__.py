@@ -1,0 +1,1 @@
+"""What did it learn? The learned torque, taken apart into physics."""
