@@ -25,7 +25,7 @@ from .terms import Term
 _ROUNDS = 12
 _TUKEY = 4.685  # 95 % efficiency with normal noise
 _FLOOR = np.array([0.05, 0.05, 0.005, 0.005, 0.005])
-"""Least standard deviation of a row, by group [N, N, N m, N m, N m]: what models never get right."""
+"""Least standard deviation of a row, by group [N, N, N m, N m, N m]: no model is better."""
 PRIOR = 3.0
 """Standard deviation of what is believed of a parameter beforehand, in its term's scale."""
 
@@ -175,7 +175,8 @@ def _pairs(normal: Normal, times: Array) -> tuple[Array, Array]:
 def _drawn(normal: Mapping[float, Normal], rng: np.random.Generator) -> tuple[Array, Array]:
     """G and b of speeds and strides drawn anew, with replacement."""
     speeds = list(normal)
-    G, b = 0.0, 0.0
+    count = next(iter(normal.values())).G.shape[-1]
+    G, b = np.zeros((count, count)), np.zeros(count)
     for index in rng.integers(len(speeds), size=len(speeds)):
         each = normal[speeds[index]]
         k = len(each.G)
@@ -184,7 +185,7 @@ def _drawn(normal: Mapping[float, Normal], rng: np.random.Generator) -> tuple[Ar
             times = np.bincount(rng.integers(k, size=k), minlength=k).astype(float)
         mine = _pairs(each, times)
         G, b = G + mine[0], b + mine[1]
-    return np.asarray(G), np.asarray(b)
+    return G, b
 
 
 def _root(G: Array) -> tuple[Array, Array]:

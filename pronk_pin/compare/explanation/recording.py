@@ -95,7 +95,6 @@ def recordings(
     strides: xr.Dataset,
     *,
     parts: tuple[str, ...] = PARTS,
-    timestep: float = 0.001,
     imu_noise: float = 0.0,
     rng: np.random.Generator | None = None,
 ) -> dict[float, tuple[PhaseRecording, ...]]:
@@ -104,7 +103,6 @@ def recordings(
     Args:
         strides: A cell of a result, with the variables `tick_...`.
         parts: Which phases.
-        timestep: Time step of the simulation [s].
         imu_noise: Standard deviation of noise added to the trunk's acceleration [m/s^2].
         rng: Source of that noise.
 
@@ -115,24 +113,26 @@ def recordings(
         raise InvalidInput(
             "this result has no ticks, which explain reads; run 'pronk-pin compare' again"
         )
-    found = {}
+    timestep = float(strides.attrs["timestep"])
+    found: dict[float, tuple[PhaseRecording, ...]] = {}
     for k, speed in enumerate(strides["speed"].to_numpy()):
         mine = strides.isel(speed=k)
-        ticks = np.isfinite(mine["tick_joints"].isel(joint=0)).sum("tick")  # (last, part)
-        usual = np.median(ticks, axis=0)
-        whole = np.flatnonzero((ticks > _SHORTEST * usual).all("part") & (usual > 1).all())
+        first = mine["tick_joint_rates"].sel(part=list(parts)).isel(joint=0)
+        ticks = np.isfinite(first.transpose("last", "part", "tick").to_numpy()).sum(axis=-1)
+        usual = np.median(ticks, axis=0)  # (parts,)
+        whole = np.flatnonzero((ticks > _SHORTEST * usual).all(axis=1) & (usual > 1.0).all())
         if len(whole) < FEWEST:
             continue
         found[float(speed)] = tuple(
             _recording(
                 mine.isel(last=whole).sel(part=part),
                 part,
-                int(ticks.sel(part=part)[whole].min()),
+                int(ticks[whole, column].min()),
                 timestep,
                 imu_noise,
                 rng,
             )
-            for part in parts
+            for column, part in enumerate(parts)
         )
     if not found:
         raise InvalidInput(f"no speed has {FEWEST} whole strides at its end; explain a longer run")

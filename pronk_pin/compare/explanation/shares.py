@@ -112,7 +112,7 @@ def _apart(
     terms: tuple[Term, ...],
     causes: Sequence[str],
 ) -> list[Array]:
-    """Learned, model, spread, and the torque of each cause, at the ticks, shape (ticks, 12) each."""
+    """Learned, model, spread, and each cause's torque at the ticks, shape (ticks, 12) each."""
     recording = phase.recording
     told = recording.torque[:, :-1].mean(axis=0)
     ahead = recording.feedforward[:, :-1]

@@ -220,7 +220,7 @@ def truth(scenario: Mapping[str, object]) -> dict[str, float]:
             ("coulomb", "Coulomb"),
         )
     }
-    x, _, z = scenario.get("payload_position", (0.0, 0.0, 0.0))  # type: ignore[misc]
+    x, _, z = np.asarray(scenario.get("payload_position", (0.0, 0.0, 0.0)), dtype=float)
     payload = number("payload")
     return {
         **by_joint,
