@@ -1,6 +1,7 @@
 """What happens, and what it says: worlds, simulations, experiments, metrics, results."""
 
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
+from .explanation import Explanation, describe, explain
 from .metrics import reduction, steady, summarize
 from .results import Results, default_folder
 from .run import run_experiment
@@ -13,6 +14,7 @@ __all__ = [
     "SCENARIOS",
     "Cell",
     "Experiment",
+    "Explanation",
     "Results",
     "Scenario",
     "Schedule",
@@ -20,6 +22,8 @@ __all__ = [
     "World",
     "build_model",
     "default_folder",
+    "describe",
+    "explain",
     "load_scenario",
     "reduction",
     "run_cell",

@@ -35,7 +35,7 @@ from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
 
-SOURCES = ("none", "model", "library")
+SOURCES = ("none", "model", "library", "identified")
 """Where a controller's first feedforward can come from."""
 
 LATEST_TOUCHDOWN = 2.0
@@ -48,7 +48,9 @@ class ControllerSpec:
 
     Attributes:
         name: Short name, as on the command line.
-        source: Where its feedforward comes from at first: "none", "model" or "library".
+        source: Where its feedforward comes from at first: "none", "model", "library", or
+            "identified", the model mended by what practice found.
+        mended_gaits: Play gaits that were optimised again with the mended model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
@@ -61,6 +63,7 @@ class ControllerSpec:
 
     name: str
     source: str = "none"
+    mended_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
@@ -88,6 +91,8 @@ CONTROLLERS = {
         ControllerSpec("model", source="model"),
         ControllerSpec("library", source="library"),
         ControllerSpec("model+ilc", source="model", law=PDTypeILC()),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),

@@ -77,6 +77,7 @@ def estimate(
     *,
     rng: np.random.Generator,
     draws: int = 300,
+    others: bool = True,
 ) -> Estimate:
     """Fit the terms to the rows of all speeds.
 
@@ -85,6 +86,8 @@ def estimate(
         terms: The terms.
         rng: Source of the strides and speeds drawn for the intervals.
         draws: How many.
+        others: Take other strides only as instruments. False is plain least squares, for strides
+            that do not repeat: biased by noise.
     """
     scale = np.array([term.scale for term in terms])
     weights = {speed: _flight_first(mine) for speed, mine in rows.items()}
@@ -96,7 +99,7 @@ def estimate(
             speed: _normal(mine, weights[speed] / sigma[mine.group] ** 2, scale)
             for speed, mine in rows.items()
         }
-        value = _solve(*_sum(normal), terms)
+        value = _solve(*_sum(normal, others), terms)
         residual = {
             speed: mine.y.mean(axis=0) - mine.A.mean(axis=0) @ value for speed, mine in rows.items()
         }
@@ -104,9 +107,9 @@ def estimate(
         weights = {
             speed: _tukey(residual[speed] / sigma[mine.group]) for speed, mine in rows.items()
         }
-    information, _ = _sum(normal)
-    free = _unbounded(*_sum(normal)) * scale
-    drawn = np.array([_unbounded(*_drawn(normal, rng)) for _ in range(draws)]) * scale
+    information, _ = total = _sum(normal, others)
+    free = _unbounded(*total) * scale
+    drawn = np.array([_unbounded(*_drawn(normal, others, rng)) for _ in range(draws)]) * scale
     return Estimate(value, drawn - free, information, *_fit(rows, value))
 
 
@@ -157,22 +160,25 @@ def _normal(rows: Equations, weight: Array, scale: Array) -> Normal:
     return Normal(G, b)
 
 
-def _sum(normal: Mapping[float, Normal]) -> tuple[Array, Array]:
+def _sum(normal: Mapping[float, Normal], others: bool) -> tuple[Array, Array]:
     """G and b over all pairs of strides of all speeds."""
-    pairs = [_pairs(each, np.ones(len(each.G))) for each in normal.values()]
+    pairs = [_pairs(each, np.ones(len(each.G)), others) for each in normal.values()]
     return sum(G for G, _ in pairs), sum(b for _, b in pairs)  # type: ignore[return-value]
 
 
-def _pairs(normal: Normal, times: Array) -> tuple[Array, Array]:
-    """Mean over pairs of different strides, each stride counted so many times."""
-    weight = np.outer(times, times)
-    np.fill_diagonal(weight, 0.0)
+def _pairs(normal: Normal, times: Array, others: bool) -> tuple[Array, Array]:
+    """Mean over pairs of different strides, or of each with itself, counted so many times."""
+    weight = np.outer(times, times) if others else np.diag(times)
+    if others:
+        np.fill_diagonal(weight, 0.0)
     weight /= weight.sum()
     G = np.einsum("jk,jkpq->pq", weight, normal.G)
     return 0.5 * (G + G.T), np.einsum("jk,jkp->p", weight, normal.b)
 
 
-def _drawn(normal: Mapping[float, Normal], rng: np.random.Generator) -> tuple[Array, Array]:
+def _drawn(
+    normal: Mapping[float, Normal], others: bool, rng: np.random.Generator
+) -> tuple[Array, Array]:
     """G and b of speeds and strides drawn anew, with replacement."""
     speeds = list(normal)
     count = next(iter(normal.values())).G.shape[-1]
@@ -183,7 +189,7 @@ def _drawn(normal: Mapping[float, Normal], rng: np.random.Generator) -> tuple[Ar
         times = np.bincount(rng.integers(k, size=k), minlength=k).astype(float)
         while np.count_nonzero(times) < 2:  # a pair needs two
             times = np.bincount(rng.integers(k, size=k), minlength=k).astype(float)
-        mine = _pairs(each, times)
+        mine = _pairs(each, times, others)
         G, b = G + mine[0], b + mine[1]
     return G, b
 
@@ -191,8 +197,8 @@ def _drawn(normal: Mapping[float, Normal], rng: np.random.Generator) -> tuple[Ar
 def _root(G: Array) -> tuple[Array, Array]:
     """Eigenvalues' roots and vectors of G and the prior."""
     values, vectors = np.linalg.eigh(G)
-    # Noise can make the mean over pairs slightly indefinite.
-    return np.sqrt(np.maximum(values, 0.0) + PRIOR**-2), vectors
+    # Noise can make the mean over pairs indefinite: such a direction is known no better than that.
+    return np.sqrt(np.abs(values) + PRIOR**-2), vectors
 
 
 def _unbounded(G: Array, b: Array) -> Array:

@@ -11,6 +11,9 @@ from ...kinematics import foot_positions
 from ...robot import Robot
 from .recording import PhaseRecording
 
+_SPAN = 0.3
+"""Distance from which on a slope shows [m]."""
+
 
 class Ground(NamedTuple):
     """The ground as the feet found it, mean over speeds."""
@@ -18,7 +21,7 @@ class Ground(NamedTuple):
     sinking: float
     """By how much the feet sink in after touchdown [m]."""
     slope: float
-    """Angle by which it rises forwards [rad]."""
+    """Angle by which it rises forwards [rad]; NaN where the robot stayed in one place."""
 
 
 def survey(robot: Robot, stances: Iterable[PhaseRecording]) -> Ground:
@@ -28,16 +31,15 @@ def survey(robot: Robot, stances: Iterable[PhaseRecording]) -> Ground:
         robot: The robot.
         stances: The stance of each speed.
     """
-    sinking, slope = [], []
+    sinking, steps = [], []
     for phase in stances:
-        k, ticks = phase.joints.shape[:2]
-        place = np.zeros((k, ticks, 3))
+        place = np.zeros((*phase.joints.shape[:2], 3))
         place[..., [0, 2]] = phase.base
-        # The mean of all strides, each from where its feet are in the middle of the stance.
         feet = foot_positions(robot, robot.q_from_base(place, phase.joints))  # (k, ticks, 4, 3)
         height = feet[..., 2].mean(axis=(0, 2))
         sinking.append(height[0] - height.min())
-        standing = feet[:, ticks // 3 : 2 * ticks // 3].mean(axis=1)  # (k, 4, 3)
-        apart = standing - standing.mean(axis=1, keepdims=True)
-        slope.append(np.sum(apart[..., 0] * apart[..., 2]) / np.sum(apart[..., 0] ** 2))
-    return Ground(float(np.mean(sinking)), float(np.arctan(np.mean(slope))))
+        middle = phase.base[:, phase.base.shape[1] // 2]  # (k, 2): it climbs with the ground
+        steps.append(middle - middle.mean(axis=0))
+    x, z = np.concatenate(steps).T
+    rise = float(x @ z / (x @ x)) if np.ptp(x) > _SPAN else np.nan
+    return Ground(float(np.mean(sinking)), float(np.arctan(rise)))

@@ -2,8 +2,9 @@
 
 With the mean of the recorded strides, and the model's torque along the reference,
 
-    learned - model = sum of terms + deviation + internal forces + unexplained - feedback.
+    learned - model = sum of terms + deviation + internal forces + unexplained.
 
+Learned is what the motors were told in the end: feedforward, and what is still left to feedback.
 Deviation is what the URDF's robot would need for the measured motion instead of the reference.
 In stance four feet leave ten of the twelve torques to themselves, in that they push the feet
 against each other and the guide: these internal forces make no motion, and no motion tells why they
@@ -33,7 +34,7 @@ FRICTION = 0.6
 """Friction coefficient of the model's torques."""
 BOUNCE = 0.03
 """Time after touchdown in which the feet bounce [s]."""
-OTHERS = ("deviation", "internal forces", "unexplained", "feedback")
+OTHERS = ("deviation", "internal forces", "unexplained")
 """Causes that are no terms."""
 
 
@@ -54,12 +55,13 @@ def shares(
         terms: The terms.
 
     Returns:
-        `learned` and `model` torques and the `spread` of the learned over the strides [N m], and
-        `torque` by `cause`; dimensions speed, part, phase, joint. NaN where a phase is left out.
+        `learned` and `model` torques, the `spread` of the learned over the strides, the part of it
+        that `feedback` gave [N m], and `torque` by `cause`; dimensions speed, part, phase, joint.
+        NaN where a phase is left out.
     """
     causes = [*dict.fromkeys(term.cause for term in terms), *OTHERS]
     shape = (len(gaits), len(PARTS), SAMPLES, robot.nu)
-    learned, model, spread = np.full((3, *shape), np.nan)
+    learned, model, spread, feedback = np.full((4, *shape), np.nan)
     torque = np.full((len(causes), *shape), np.nan)
     for k, (gait, by_part) in enumerate(zip(gaits, phases, strict=True)):
         reference = feedforward(
@@ -70,7 +72,7 @@ def shares(
             planned = gait.phase(part).duration
             on_ticks = _model_on_ticks(mine, getattr(reference, part), planned)
             parts = _apart(mine, on_ticks, value, terms, causes)
-            learned[at], model[at], spread[at], *rest = (
+            learned[at], model[at], spread[at], feedback[at], *rest = (
                 _on_grid(mine, values, planned) for values in parts
             )
             torque[(slice(None), *at)] = rest
@@ -78,9 +80,10 @@ def shares(
     names = [name.removesuffix("_joint") for name in robot.joint_names]
     return xr.Dataset(
         {
-            "learned": (dims, learned, {"units": "N m", "long_name": "learned feedforward"}),
+            "learned": (dims, learned, {"units": "N m", "long_name": "torque told in the end"}),
             "model": (dims, model, {"units": "N m", "long_name": "feedforward of the model"}),
             "spread": (dims, spread, {"units": "N m", "long_name": "deviation over strides"}),
+            "feedback": (dims, feedback, {"units": "N m", "long_name": "feedback in learned"}),
             "torque": (("cause", *dims), torque, {"units": "N m", "long_name": "explained by"}),
         },
         coords={
@@ -112,10 +115,10 @@ def _apart(
     terms: tuple[Term, ...],
     causes: Sequence[str],
 ) -> list[Array]:
-    """Learned, model, spread, and each cause's torque at the ticks, shape (ticks, 12) each."""
+    """Learned, model, spread, feedback, and each cause's torque, at the ticks (ticks, 12)."""
     recording = phase.recording
     told = recording.torque[:, :-1].mean(axis=0)
-    ahead = recording.feedforward[:, :-1]
+    ahead = recording.feedforward[:, :-1].mean(axis=0)
     known, columns = phase.known.mean(axis=0), phase.columns.mean(axis=0) * value
     needed = -known
     needed[:, NB:] += told  # rnea of the URDF
@@ -139,8 +142,8 @@ def _apart(
     by_cause["deviation"] = needed - model
     by_cause["internal forces"] = internal
     by_cause["unexplained"] = moving - needed - columns.sum(axis=0)
-    by_cause["feedback"] = ahead.mean(axis=0) - told
-    return [ahead.mean(axis=0), model, ahead.std(axis=0), *by_cause.values()]
+    spread = recording.torque[:, :-1].std(axis=0)
+    return [told, model, spread, told - ahead, *by_cause.values()]
 
 
 def _on_grid(phase: PhaseForces, values: Array, planned: float) -> Array:
@@ -160,24 +163,34 @@ def share_table(found: xr.Dataset) -> xr.DataArray:
     The cause's torque times the discrepancy over the discrepancy's square, both summed over
     speeds, legs and phases outside the bounce: negative where a cause works against it.
     """
-    discrepancy, torque = _outside_bounce(found)
-    over = ("speed", "phase")
-    return _by_kind(torque * discrepancy).sum(over) / _by_kind(discrepancy**2).sum(over)
+    return _projected(found, found["torque"])
+
+
+def feedback_share(found: xr.Dataset) -> xr.DataArray:
+    """How much of the discrepancy feedback still gave, by part and kind of joint."""
+    return _projected(found, found["feedback"])
+
+
+def discrepancy(found: xr.Dataset) -> xr.DataArray:
+    """Learned less model torque [N m]; NaN in the bounce after touchdown."""
+    return _settled(found, found["learned"] - found["model"])
+
+
+def _projected(found: xr.Dataset, torque: xr.DataArray) -> xr.DataArray:
+    size, over = discrepancy(found), ("speed", "phase")
+    return _by_kind(_settled(found, torque) * size).sum(over) / _by_kind(size**2).sum(over)
 
 
 def explained(found: xr.Dataset) -> xr.DataArray:
     """R^2 by part and kind of joint: 1 less the square of the unexplained over the discrepancy's,
     outside the bounce after touchdown."""
-    discrepancy, torque = _outside_bounce(found)
-    rest = torque.sel(cause="unexplained")
-    over = ("speed", "phase")
-    return 1.0 - _by_kind(rest**2).sum(over) / _by_kind(discrepancy**2).sum(over)
+    rest, over = _settled(found, found["torque"].sel(cause="unexplained")), ("speed", "phase")
+    return 1.0 - _by_kind(rest**2).sum(over) / _by_kind(discrepancy(found) ** 2).sum(over)
 
 
-def _outside_bounce(found: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+def _settled(found: xr.Dataset, values: xr.DataArray) -> xr.DataArray:
     time = found["phase"] * found["duration"]
-    settled = (found["part"] != "stance") | (time > BOUNCE)
-    return (found["learned"] - found["model"]).where(settled), found["torque"].where(settled)
+    return values.where((found["part"] != "stance") | (time > BOUNCE))
 
 
 def _by_kind(values: xr.DataArray) -> xr.DataArray:
