@@ -25,6 +25,8 @@ SINKING = 0.005
 """Depth from which on the ground gives way [m]; a stiff one takes 2.5 mm in a landing."""
 SLOPE = np.radians(1.0)
 """Slope from which on the ground is not level [rad]."""
+_INTERNAL = 1.0
+"""Torque from which on internal forces are worth a word [N m]."""
 _UNITS = {"x": "N", "z": "N"}
 
 
@@ -92,6 +94,7 @@ def words(explanation: Explanation) -> list[str]:
     return [
         *_of_the_strides(explanation),
         *_of_the_rest(explanation),
+        *_of_internal_forces(explanation),
         *_of_the_ground(explanation),
         *_of_confounding(explanation),
     ]
@@ -141,6 +144,22 @@ def _place(group: str) -> str:
     if group in _UNITS:
         return f"the balance of forces along {group} in stance"
     return f"the {group}s in flight"
+
+
+def _of_internal_forces(explanation: Explanation) -> Iterator[str]:
+    torque = explanation.shares["torque"].sel(cause="internal forces", part="stance")
+    kinds = [str(name).split("_")[1] for name in torque["joint"].to_numpy()]
+    for joint in dict.fromkeys(kinds):
+        mine = torque.isel(joint=[kind == joint for kind in kinds])
+        size = float(np.sqrt((mine**2).mean()))
+        share = float(
+            explanation.share_table.sel(cause="internal forces", part="stance").sel(joint=joint)
+        )
+        if share > 0.5 and size > _INTERNAL:
+            yield (
+                f"In stance the {joint}s learned {size:.1f} N m (root mean square) that make no "
+                "motion: the feet push against each other and the guide."
+            )
 
 
 def _of_the_ground(explanation: Explanation) -> Iterator[str]:
