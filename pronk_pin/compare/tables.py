@@ -152,14 +152,15 @@ def _format_beside(table: pd.DataFrame) -> str:
 
 
 def _format_overview(table: pd.DataFrame) -> str:
+    wide = max(10, *(len(str(name)) for name in table.index))
     lines = [
-        f"{'':>10}  {'peak [rad]':^15}  {'RMS [rad]':^15}  strides to  feedback's  stayed",
-        f"{'controller':>10}  {'calf':>7} {'thigh':>7}  {'calf':>7} {'thigh':>7}  "
+        f"{'':>{wide}}  {'peak [rad]':^15}  {'RMS [rad]':^15}  strides to  feedback's  stayed",
+        f"{'controller':>{wide}}  {'calf':>7} {'thigh':>7}  {'calf':>7} {'thigh':>7}  "
         f"{'converge':>10}  {'share':>10}  upright",
     ]
     for name, row in table.iterrows():
         lines.append(
-            f"{name:>10}  {row['calf']:7.4f} {row['thigh']:7.4f}  {row['calf_rms']:7.4f} "
+            f"{name:>{wide}}  {row['calf']:7.4f} {row['thigh']:7.4f}  {row['calf_rms']:7.4f} "
             f"{row['thigh_rms']:7.4f}  {_number(row['strides'], '.0f'):>10}  "
             f"{row['feedback']:>10.0%}  {row['upright']:.0f} of {row['robots']:.0f}"
         )

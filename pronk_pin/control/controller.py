@@ -36,7 +36,7 @@ from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
 
-SOURCES = ("none", "model", "library")
+SOURCES = ("none", "model", "library", "identified")
 """Where a controller's first feedforward can come from."""
 
 LATEST_TOUCHDOWN = 2.0
@@ -49,7 +49,9 @@ class ControllerSpec:
 
     Attributes:
         name: Short name, as on the command line.
-        source: Where its feedforward comes from at first: "none", "model" or "library".
+        source: Where its feedforward comes from at first: "none", "model", "library", or
+            "identified", the model mended by what practice found.
+        mended_gaits: Play gaits that were optimised again with the mended model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
@@ -63,6 +65,7 @@ class ControllerSpec:
 
     name: str
     source: str = "none"
+    mended_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
@@ -101,6 +104,8 @@ CONTROLLERS = {
         ControllerSpec("library", source="library"),
         ControllerSpec("model+ilc", source="model", law=PDTypeILC(), flight_law=FLIGHT_LAW),
         ControllerSpec("ilc-stance", law=PDTypeILC()),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),

@@ -25,6 +25,8 @@ COLORS = {
     "ilc": "#0072B2",
     "model+ilc": "#009E73",
     "ilc-paper": "#D55E00",
+    "identified": "#999933",
+    "identified+gait": "#882255",
     "paper": "#CC79A7",
 }
 """Colour of a controller; "paper" are the paper's own numbers."""
@@ -36,6 +38,8 @@ LABELS = {
     "ilc": "ILC",
     "model+ilc": "ILC seeded by the model",
     "ilc-paper": "ILC, the paper's law",
+    "identified": "PD + identified model",
+    "identified+gait": "PD + identified model, gaits again",
 }
 
 _JOINTS = ("calf", "thigh")
