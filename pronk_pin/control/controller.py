@@ -91,11 +91,11 @@ CONTROLLERS = {
         ControllerSpec("model", source="model"),
         ControllerSpec("library", source="library"),
         ControllerSpec("model+ilc", source="model", law=PDTypeILC()),
-        ControllerSpec("identified", source="identified"),
-        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
