@@ -196,7 +196,7 @@ def _feedforward(
 
 def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
     if practised is None:
-        raise InvalidInput(f"controller '{spec.name}' uses what 'ilc' has learned; run it")
+        raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
     return practised
 
 

@@ -104,11 +104,11 @@ CONTROLLERS = {
         ControllerSpec("library", source="library"),
         ControllerSpec("model+ilc", source="model", law=PDTypeILC(), flight_law=FLIGHT_LAW),
         ControllerSpec("ilc-stance", law=PDTypeILC()),
-        ControllerSpec("identified", source="identified"),
-        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
