@@ -13,7 +13,7 @@ from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from ._urdf import mujoco_spec
 from .compare import Experiment, Results, default_folder, run_experiment
-from .compare.tables import format_tables
+from .compare.words import format_tables
 from .errors import InvalidInput, PronkError
 from .gait import (
     GaitLibrary,

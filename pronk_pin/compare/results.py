@@ -35,6 +35,7 @@ import xarray as xr
 from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, UnknownName, cannot_write
 from .experiment import Cell, Experiment
 from .metrics import COLUMNS, KEYS, summarize
+from .practice import practice, rows_of_beating
 from .provenance import versions
 from .simulate import Schedule
 
@@ -212,8 +213,14 @@ class Results:
 
     def summarize(self) -> pd.DataFrame:
         """Compute the summary from the strides, and write summary.csv."""
-        tables = [summarize(self.strides(cell)) for cell in self.experiment.cells()]
-        summary = pd.concat(tables).sort_values(KEYS, ignore_index=True)[COLUMNS]
+        tables, practised = [], []
+        for cell in self.experiment.cells():
+            strides = self.strides(cell)
+            tables.append(summarize(strides))
+            practised.append(practice(strides))
+        tables.append(pd.DataFrame(rows_of_beating(practised), columns=COLUMNS))
+        full = [table for table in tables if len(table)]
+        summary = pd.concat(full).sort_values(KEYS, ignore_index=True)[COLUMNS]
         self.write("summary.csv", summary.to_csv(index=False))
         return summary
 

@@ -192,9 +192,14 @@ def _pivot(rows: pd.DataFrame) -> pd.DataFrame:
     )
 
 
+def unit_of(values: pd.DataFrame) -> str:
+    """What is drawn from a table of `robots`: "seed" or "speed"."""
+    return "seed" if len(values) >= LEAST_UNITS else "speed"
+
+
 def _by_unit(values: pd.DataFrame) -> tuple[Array, str]:
     """Mean of each unit, and what the unit is; units without any value are left out."""
-    unit = "seed" if len(values) >= LEAST_UNITS else "speed"
+    unit = unit_of(values)
     means = values.mean(axis="columns" if unit == "seed" else "index").to_numpy(dtype=float)
     return means[~np.isnan(means)], unit
 

@@ -15,7 +15,8 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..compare import Results
-from ..compare.tables import SHOWN, beside_the_paper, overview, verdict
+from ..compare.tables import SHOWN, beside_the_paper, overview
+from ..compare.words import verdict
 from ..errors import cannot_write
 from . import figures
 
