@@ -57,7 +57,7 @@ def practice(strides: xr.Dataset) -> Practice:
 def strides_to_beat(peaks: Array, level: float) -> float:
     """Strides of learning until the error is below a level, and stays there.
 
-    The first stride from which on every mean over `WINDOW` strides is below the level.
+    The first stride below the level from which on every mean over `WINDOW` strides is, too.
 
     Args:
         peaks: Peak errors by stride of learning [rad], shape (strides,).
@@ -71,7 +71,9 @@ def strides_to_beat(peaks: Array, level: float) -> float:
     below = np.convolve(peaks, np.full(WINDOW, 1.0 / WINDOW), "valid") < level
     above = np.flatnonzero(~below)
     first = int(above[-1]) + 1 if above.size else 0
-    return float(first + 1) if first < below.size else float("nan")
+    if first >= below.size:
+        return float("nan")
+    return float(first + np.argmax(peaks[first:] < level) + 1)
 
 
 def rows_of_beating(practised: list[Practice]) -> Iterator[dict[str, object]]:
