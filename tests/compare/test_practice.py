@@ -21,7 +21,7 @@ from pronk_pin.compare.practice import (
 
 def test_the_model_is_beaten_from_the_first_stride_that_stays_below_it() -> None:
     peaks = np.array([0.10, 0.08, 0.06, 0.04, *[0.02] * 20])
-    assert strides_to_beat(peaks, 0.05) == 3.0  # 0.06 and four less: 0.032 in the mean
+    assert strides_to_beat(peaks, 0.05) == 4.0  # earlier means are below it, but not the strides
     assert strides_to_beat(peaks, 0.2) == 1.0
     assert np.isnan(strides_to_beat(peaks, 0.01))
 
