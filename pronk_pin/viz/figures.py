@@ -37,8 +37,7 @@ _LEG = "FL"  # the leg that the paper shows
 
 def stance(strides: xr.Dataset, name: str) -> xr.DataArray:
     """A curve of the stance: (speed, stride, phase, joint), or without what it does not have."""
-    curve = strides[name]
-    return curve.sel(part="stance") if "part" in curve.dims else curve
+    return strides[name].sel(part="stance")
 
 
 @styled
