@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from string import Template
 from typing import Any
 
 import pandas as pd
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..compare import Results
@@ -19,6 +17,7 @@ from ..compare.tables import SHOWN, beside_the_paper, overview
 from ..compare.words import verdict
 from ..errors import cannot_write
 from . import figures
+from .style import figure_bytes, save_figure
 
 SHOWN_SPEED = 0.3
 """Speed of the tracking figure [m/s]: the paper's."""
@@ -33,6 +32,8 @@ _CAPTIONS = {
     "(the paper's Fig. 3).",
     "torques": "Torque library: the learned feedforward, averaged over the last 30 strides "
     "(the paper's Fig. 4).",
+    "surface": "The same torques over speed and phase.",
+    "difference": "What practice adds to the model: learned minus the model's feedforward torque.",
 }
 
 _LIMITS = (
@@ -133,25 +134,24 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
         learned = strides[LEARNER]
         found["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
         found["torques"] = figures.torque_library(learned)
+        found["surface"] = figures.torque_surface(learned)
+        if "model" in strides:
+            found["difference"] = figures.learned_minus_model(learned, strides["model"])
     return found
 
 
 def write_figures(results: Results, folder: Path) -> list[Path]:
-    """Write the figures of the first scenario as SVG files into a folder.
+    """Write the figures of the first scenario into a folder, each as SVG and as PDF.
 
     Raises:
         FileProblem: The folder cannot be written, or the result is damaged.
     """
-    paths = []
-    for name, figure in scenario_figures(results, results.experiment.scenarios[0]).items():
-        path = folder / f"{name}.svg"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(_svg(figure))
-        except OSError as error:
-            raise cannot_write(path, error) from error
-        paths.append(path)
-    return paths
+    found = scenario_figures(results, results.experiment.scenarios[0])
+    return [
+        save_figure(figure, folder / f"{name}.{suffix}")
+        for name, figure in found.items()
+        for suffix in ("svg", "pdf")
+    ]
 
 
 def _scenario(results: Results, summary: pd.DataFrame, scenario: str) -> Iterator[str]:
@@ -167,7 +167,9 @@ def _scenario(results: Results, summary: pd.DataFrame, scenario: str) -> Iterato
     if "tracking" in found:
         yield f'<h2 id="{scenario}-learned">Before and after, and what was learned</h2>'
         yield _figure(found, "tracking")
-        yield _figure(found, "torques")
+        for name in ("torques", "surface", "difference"):
+            if name in found:
+                yield _figure(found, name)
 
 
 def _overview(table: pd.DataFrame) -> str:
@@ -222,19 +224,14 @@ def _provenance(provenance: Any) -> str:
 
 def _figure(found: Mapping[str, Figure], name: str) -> str:
     """A figure as an inline SVG picture with its caption."""
-    data, text = base64.b64encode(_svg(found[name])).decode(), html.escape(_CAPTIONS[name])
+    data, text = (
+        base64.b64encode(figure_bytes(found[name], "svg")).decode(),
+        html.escape(_CAPTIONS[name]),
+    )
     return (
         f'<figure><img alt="{text}" src="data:image/svg+xml;base64,{data}">'
         f"<figcaption>{text}</figcaption></figure>"
     )
-
-
-def _svg(figure: Figure) -> bytes:
-    """A figure as SVG, the same bytes each time."""
-    buffer = io.BytesIO()
-    with rc_context({"svg.hashsalt": "pronk_pin"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return buffer.getvalue()
 
 
 def _count(value: float) -> str:
