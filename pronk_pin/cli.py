@@ -14,7 +14,7 @@ from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 from ._urdf import mujoco_spec
 from .compare import Experiment, Results, default_folder, describe, explain, run_experiment
 from .compare.closing import close_loop, format_loop
-from .compare.tables import format_tables
+from .compare.words import format_tables
 from .errors import InvalidInput, PronkError
 from .gait import (
     GaitLibrary,
@@ -48,11 +48,15 @@ class Compare:
     """Results folder; by default results/<time>-comparison."""
     workers: int | None = None
     """Processes; by default one for each core."""
+    executor: str | None = None
+    """Who simulates instead of these processes: dask://HOST:PORT of a dask scheduler."""
 
     def run(self) -> None:
         """Do it."""
         folder = self.folder or default_folder()
-        results = run_experiment(self.experiment, folder, workers=self.workers)
+        results = run_experiment(
+            self.experiment, folder, workers=self.workers, executor=self.executor
+        )
         print(f"robot {self.experiment.robot}, base {self.experiment.base}")
         for scenario in self.experiment.scenarios:
             print(f"\nscenario {scenario}\n")

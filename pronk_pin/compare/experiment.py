@@ -33,6 +33,9 @@ LEARNED = ("library", "identified")
 
 DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
 
+PRACTISED = ("count", "learning", "feedforward")
+"""What of a practised cell's strides the torque library is made of."""
+
 
 @dataclass(frozen=True)
 class Experiment:

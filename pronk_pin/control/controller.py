@@ -109,6 +109,7 @@ CONTROLLERS = {
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
         ControllerSpec("identified", source="identified"),
         ControllerSpec("identified+gait", source="identified", mended_gaits=True),
+        ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
