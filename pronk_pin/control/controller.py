@@ -57,6 +57,7 @@ class ControllerSpec:
         selection: Strides worth learning from.
         contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
+        imu: Whether an accelerometer on the trunk helps that estimate.
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
             contact sensor is one late, and the contact began between two ticks.
     """
@@ -70,6 +71,7 @@ class ControllerSpec:
     selection: StrideSelection = field(default_factory=StrideSelection)
     contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
+    imu: bool = False
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
@@ -94,6 +96,7 @@ CONTROLLERS = {
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        ControllerSpec("ilc-imu", law=PDTypeILC(), imu=True),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
