@@ -12,7 +12,7 @@ import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from ._urdf import mujoco_spec
-from .compare import Experiment, Results, default_folder, run_experiment
+from .compare import Experiment, Results, default_folder, mjcf_parity, run_experiment
 from .compare.tables import format_tables
 from .errors import InvalidInput, PronkError
 from .gait import (
@@ -49,6 +49,8 @@ class Compare:
     def run(self) -> None:
         """Do it."""
         folder = self.folder or default_folder()
+        if self.experiment.world:
+            print(mjcf_parity(load_robot(self.experiment.robot), self.experiment.world).table())
         results = run_experiment(self.experiment, folder, workers=self.workers)
         print(f"robot {self.experiment.robot}, base {self.experiment.base}")
         for scenario in self.experiment.scenarios:

@@ -213,6 +213,8 @@ def _values(name: str, parts: list[str]) -> dict[str, float]:
     """The values of the mismatches in a name, in the order of `KNOWN`."""
     values: dict[str, float] = {}
     for part in parts:
+        if _world(part) is not None:
+            raise InvalidInput(f"scenario '{name}': a world, as {part}, comes first in a name")
         mismatch, equals, number = part.partition("=")
         if mismatch not in KNOWN:
             raise UnknownName("scenario", part, (*WORLDS, *KNOWN, "random-SEED-INDEX"))

@@ -102,6 +102,7 @@ def test_a_value_in_a_name_is_the_value_to_the_bit() -> None:
     [
         ("payload+payload", "payload is in it twice"),
         ("payload+payload-front", "two parts of it change payload; keep one"),
+        ("payload+ideal", "a world, as ideal, comes first in a name"),
         ("payload=heavy", "'payload=heavy' needs a number after '=', in kg, as in payload=3"),
         ("payload=nan", "needs a number after '='"),
         ("payload=", "needs a number after '='"),
