@@ -12,7 +12,15 @@ import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from ._urdf import mujoco_spec
-from .compare import Experiment, Results, default_folder, describe, explain, run_experiment
+from .compare import (
+    Experiment,
+    Results,
+    default_folder,
+    describe,
+    explain,
+    mjcf_parity,
+    run_experiment,
+)
 from .compare.closing import close_loop, format_loop
 from .compare.words import format_tables
 from .errors import InvalidInput, PronkError
@@ -54,6 +62,8 @@ class Compare:
     def run(self) -> None:
         """Do it."""
         folder = self.folder or default_folder()
+        if self.experiment.world:
+            print(mjcf_parity(load_robot(self.experiment.robot), self.experiment.world).table())
         results = run_experiment(
             self.experiment, folder, workers=self.workers, executor=self.executor
         )

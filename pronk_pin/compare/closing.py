@@ -7,7 +7,6 @@ library of the practised speeds.
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -127,8 +126,8 @@ def _worlds(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> 
     if scenarios is not None:
         return [load_scenario(one) if isinstance(one, str) else one for one in scenarios]
     try:
-        own = Scenario(**ast.literal_eval(strides.attrs["scenario_parameters"]))
-    except (KeyError, ValueError, SyntaxError, TypeError) as error:
+        own = Scenario.from_json(strides.attrs["scenario_parameters"])
+    except (KeyError, InvalidInput) as error:
         raise InvalidInput(
             "these strides do not tell the world they were made in; give the scenarios"
         ) from error

@@ -204,7 +204,7 @@ def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
 
 
 def _attributes(cell: Cell) -> dict[str, str | int | float]:
-    scenario = dataclasses.asdict(load_scenario(cell.scenario, mjcf=cell.world))
+    scenario = load_scenario(cell.scenario, mjcf=cell.world)
     world = hashlib.sha256(Path(cell.world).read_bytes()).hexdigest() if cell.world else ""
     return {
         "robot": cell.robot,
@@ -212,8 +212,8 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "scenario": cell.scenario,
         "controller": cell.controller,
         "seed": cell.seed,
-        "scenario_parameters": repr(scenario),
+        "scenario_parameters": scenario.to_json(),
         "world": cell.world,
         "world_sha256": world,
-        "timestep": scenario["timestep"],
+        "timestep": scenario.timestep,
     }

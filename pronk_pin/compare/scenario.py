@@ -9,9 +9,10 @@ the seed of a sampled world stands in it too.
 
 from __future__ import annotations
 
+import json
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -113,6 +114,26 @@ class Scenario:
         if self.seed < 0:
             raise self._wrong("seed must not be negative")
 
+    def to_json(self) -> str:
+        """Everything in it as text; `from_json` reads it."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Scenario:
+        """The scenario that `to_json` wrote.
+
+        Raises:
+            InvalidInput: The text is something else.
+        """
+        try:
+            values = json.loads(text)
+            vectors = {name: tuple(values[name]) for name in _VECTORS}
+            return cls(**{**values, **vectors, "sensors": Sensors(**values["sensors"])})
+        except (KeyError, TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"this is not a scenario ({error}); make the strides again"
+            ) from error
+
     def _check_ground(self) -> None:
         if not self.ground_time_constant >= 2 * self.timestep:
             raise self._wrong(
@@ -213,6 +234,8 @@ def _values(name: str, parts: list[str]) -> dict[str, float]:
     """The values of the mismatches in a name, in the order of `KNOWN`."""
     values: dict[str, float] = {}
     for part in parts:
+        if _world(part) is not None:
+            raise InvalidInput(f"scenario '{name}': a world, as {part}, comes first in a name")
         mismatch, equals, number = part.partition("=")
         if mismatch not in KNOWN:
             raise UnknownName("scenario", part, (*WORLDS, *KNOWN, "random-SEED-INDEX"))

@@ -6,13 +6,13 @@ A stance ends by time, as its reference does; a flight ends with the touchdown t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from .._typing import Array, IntArray
-from ..control import Controller, ControllerSpec, Tape, clip_torque, phase_grid
+from ..control import Controller, ControllerSpec, PhaseLog, Tape, clip_torque, phase_grid
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..robot import Robot
@@ -181,7 +181,7 @@ class Simulation:
         strides.begin(rows, self._seconds(start), learning, left=self._seconds(steps - start))
 
         stance = self._play(rows, controller.touchdown(rows, learning))
-        tape, record = controller.liftoff(rows, seen.phase(rows, stance, felt=late))
+        tape, record = controller.liftoff(rows, self._measured(rows, stance, felt=late))
         if seen is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, felt=late))
         strides.stance(rows, record, log, stance)
@@ -189,13 +189,30 @@ class Simulation:
         # A touchdown is felt late: the last ticks of the flight's tape are the next stance's.
         flight = self._play(rows, tape, airborne=True) - late
         duration, upright = self._seconds(stance + flight), self.upright[rows]
-        record = controller.landing(rows, seen.phase(rows, flight), duration, upright)
+        record = controller.landing(rows, self._measured(rows, flight), duration, upright)
         if seen is not log:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)
         self._rewind(rows, flight)
         strides.end(rows, duration, log.base[rows, 0, 0], upright, controller.skipped[rows])
         self._clock[rows] = start + stance + flight
+
+    def _measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+        """What the robots measured in a part of the stride of so many ticks (m,)."""
+        phase = self._seen.phase(rows, length, felt=felt)
+        if not self.controller.spec.imu:
+            return phase
+        # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
+        rate = self._log.base_rate[rows, : int(length.max()) + 1]
+        if rate.shape[1] == int(length.max()):
+            rate = np.concatenate([rate, rate[:, -1:]], axis=1)
+        force = np.zeros((*rate[:, 1:].shape[:2], 3))
+        force[..., [0, 2]] = np.diff(rate, axis=1) / self._dt
+        last = np.arange(len(rows)), length - 1
+        force[last] = force[last[0], np.maximum(length - 2, 0)]  # the log ends there
+        force -= self.world.scenario.gravity_vector
+        _, force = self._sensors.imu(rows, np.zeros_like(force), force)
+        return replace(phase, specific_force=force)
 
     def _rewind(self, rows: IntArray, start: IntArray) -> None:
         """The ticks from `start` (m,) on, in which a touchdown was not felt, are the stance's."""

@@ -59,6 +59,7 @@ class ControllerSpec:
         selection: Strides worth learning from.
         contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
+        imu: Whether an accelerometer on the trunk helps that estimate.
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
             contact sensor is one late, and the contact began between two ticks.
     """
@@ -73,6 +74,7 @@ class ControllerSpec:
     selection: StrideSelection = field(default_factory=StrideSelection)
     contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
+    imu: bool = False
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
@@ -110,6 +112,7 @@ CONTROLLERS = {
         ControllerSpec("identified", source="identified"),
         ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
+        ControllerSpec("ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True),
     )
 }
 """Controllers known by name; the first five make the default comparison."""

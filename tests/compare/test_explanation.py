@@ -79,7 +79,7 @@ def practise(
         "scenario": scenario.name,
         "controller": controller,
         "seed": seed,
-        "scenario_parameters": repr(dataclasses.asdict(scenario)),
+        "scenario_parameters": scenario.to_json(),
         "timestep": scenario.timestep,
     }
     return to_dataset(simulation.run(), robot, gaits, attributes=attributes)
@@ -108,7 +108,7 @@ def found(practised: xr.Dataset) -> Explanation:
 
 
 def true_values(scenario: Scenario) -> Array:
-    by_name = truth(dataclasses.asdict(scenario))
+    by_name = truth(scenario)
     return np.array([by_name[term.name] for term in TERMS])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +15,7 @@ from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ...parameters import ModelParameters
 from ...robot import Robot, load_robot
+from ..scenario import Scenario
 from .equations import Equations, PhaseForces, equations, phase_forces
 from .estimate import Confounding, Estimate, confounding, estimate, repetition
 from .ground import Ground, survey
@@ -195,6 +195,6 @@ def _stances(recorded: Iterable[tuple[PhaseRecording, ...]]) -> list[PhaseRecord
 def _truth(strides: xr.Dataset) -> dict[str, float]:
     """The true parameters, as the strides' attributes tell them."""
     try:
-        return truth(ast.literal_eval(strides.attrs["scenario_parameters"]))
-    except (KeyError, ValueError, SyntaxError, TypeError):
+        return truth(Scenario.from_json(strides.attrs["scenario_parameters"]))
+    except (KeyError, InvalidInput):
         return {}

@@ -21,6 +21,7 @@ import pinocchio as pin
 from ..._typing import Array
 from ...parameters import NOTHING, ModelParameters
 from ...robot import JOINTS, NB, Robot
+from ..scenario import Scenario
 
 
 class Motion(NamedTuple):
@@ -205,14 +206,10 @@ def parameters(values: Mapping[str, float], robot: Robot) -> ModelParameters:
     )
 
 
-def truth(scenario: Mapping[str, object]) -> dict[str, float]:
+def truth(scenario: Scenario) -> dict[str, float]:
     """The terms' true parameters in a simulated world, as far as it names them."""
-
-    def number(name: str, default: float = 0.0) -> float:
-        return float(scenario.get(name, default))  # type: ignore[arg-type]
-
     by_joint = {
-        f"{joint} {name}": number(field)
+        f"{joint} {name}": getattr(scenario, field)
         for joint in JOINTS
         for field, name in (
             ("armature", "armature"),
@@ -220,13 +217,12 @@ def truth(scenario: Mapping[str, object]) -> dict[str, float]:
             ("coulomb", "Coulomb"),
         )
     }
-    x, _, z = np.asarray(scenario.get("payload_position", (0.0, 0.0, 0.0)), dtype=float)
-    payload = number("payload")
+    x, _, z = scenario.payload_position
     return {
         **by_joint,
-        "payload": payload,
-        "trunk moment x": payload * float(x),
-        "trunk moment z": payload * float(z),
-        "weak motors": 1.0 - number("torque_constant", 1.0),
-        "delay": number("delay"),
+        "payload": scenario.payload,
+        "trunk moment x": scenario.payload * x,
+        "trunk moment z": scenario.payload * z,
+        "weak motors": 1.0 - scenario.torque_constant,
+        "delay": scenario.delay,
     }
