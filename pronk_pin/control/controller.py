@@ -36,7 +36,7 @@ from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
 
-SOURCES = ("none", "model", "library")
+SOURCES = ("none", "model", "library", "identified")
 """Where a controller's first feedforward can come from."""
 
 LATEST_TOUCHDOWN = 2.0
@@ -49,7 +49,9 @@ class ControllerSpec:
 
     Attributes:
         name: Short name, as on the command line.
-        source: Where its feedforward comes from at first: "none", "model" or "library".
+        source: Where its feedforward comes from at first: "none", "model", "library", or
+            "identified", the model mended by what practice found.
+        mended_gaits: Play gaits that were optimised again with the mended model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
@@ -64,6 +66,7 @@ class ControllerSpec:
 
     name: str
     source: str = "none"
+    mended_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
@@ -85,18 +88,31 @@ class ControllerSpec:
         return self.law, self.flight_law
 
 
+FLIGHT_LAW = PDTypeILC(
+    leak=0.02,
+    delta=0.04,
+    # The error's rate would learn the vibration of the leg after lift-off.
+    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    filter=ZeroPhaseFilter.butterworth(3, 0.04),
+)
+"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
+
 CONTROLLERS = {
     spec.name: spec
     for spec in (
         ControllerSpec("pd"),
-        ControllerSpec("ilc", law=PDTypeILC()),
+        ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW),
         ControllerSpec("model", source="model"),
         ControllerSpec("library", source="library"),
-        ControllerSpec("model+ilc", source="model", law=PDTypeILC()),
+        ControllerSpec("model+ilc", source="model", law=PDTypeILC(), flight_law=FLIGHT_LAW),
+        ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
         ControllerSpec("ilc-imu", law=PDTypeILC(), imu=True),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
+        ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
     )
 }
 """Controllers known by name; the first five make the default comparison."""

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from string import Template
 from typing import Any
 
 import pandas as pd
-from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ..compare import Results
-from ..compare.tables import SHOWN, beside_the_paper, overview, verdict
+from ..compare.tables import SHOWN, beside_the_paper, overview
+from ..compare.words import verdict
 from ..errors import cannot_write
 from . import figures
+from .style import figure_bytes, save_figure
 
 SHOWN_SPEED = 0.3
 """Speed of the tracking figure [m/s]: the paper's."""
@@ -32,6 +32,8 @@ _CAPTIONS = {
     "(the paper's Fig. 3).",
     "torques": "Torque library: the learned feedforward, averaged over the last 30 strides "
     "(the paper's Fig. 4).",
+    "surface": "The same torques over speed and phase.",
+    "difference": "What practice adds to the model: learned minus the model's feedforward torque.",
 }
 
 _LIMITS = (
@@ -100,7 +102,7 @@ def report_html(results: Results) -> str:
         body="\n".join(sections),
         limits="".join(f"<li>{html.escape(text)}</li>" for text in _LIMITS),
         command=html.escape(command(results)),
-        provenance=_provenance(results.config),
+        provenance=_provenance(results.provenance),
     )
 
 
@@ -132,25 +134,24 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
         learned = strides[LEARNER]
         found["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
         found["torques"] = figures.torque_library(learned)
+        found["surface"] = figures.torque_surface(learned)
+        if "model" in strides:
+            found["difference"] = figures.learned_minus_model(learned, strides["model"])
     return found
 
 
 def write_figures(results: Results, folder: Path) -> list[Path]:
-    """Write the figures of the first scenario as SVG files into a folder.
+    """Write the figures of the first scenario into a folder, each as SVG and as PDF.
 
     Raises:
         FileProblem: The folder cannot be written, or the result is damaged.
     """
-    paths = []
-    for name, figure in scenario_figures(results, results.experiment.scenarios[0]).items():
-        path = folder / f"{name}.svg"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(_svg(figure))
-        except OSError as error:
-            raise cannot_write(path, error) from error
-        paths.append(path)
-    return paths
+    found = scenario_figures(results, results.experiment.scenarios[0])
+    return [
+        save_figure(figure, folder / f"{name}.{suffix}")
+        for name, figure in found.items()
+        for suffix in ("svg", "pdf")
+    ]
 
 
 def _scenario(results: Results, summary: pd.DataFrame, scenario: str) -> Iterator[str]:
@@ -166,7 +167,9 @@ def _scenario(results: Results, summary: pd.DataFrame, scenario: str) -> Iterato
     if "tracking" in found:
         yield f'<h2 id="{scenario}-learned">Before and after, and what was learned</h2>'
         yield _figure(found, "tracking")
-        yield _figure(found, "torques")
+        for name in ("torques", "surface", "difference"):
+            if name in found:
+                yield _figure(found, name)
 
 
 def _overview(table: pd.DataFrame) -> str:
@@ -202,14 +205,16 @@ def _table_1(table: pd.DataFrame) -> str:
     return str(shown.to_html(border=0)) + note
 
 
-def _provenance(config: Any) -> str:
-    rows = {
-        "versions": ", ".join(f"{k} {v}" for k, v in config["versions"].items()),
-        "Python": config["python"],
-        "system": config["platform"],
-        "CPU": f"{config['cpu']} ({config['cores']} cores)",
-        "wall time": f"{config['wall_time_s']:g} s" if config.get("finished") else "not finished",
-    }
+def _provenance(provenance: Any) -> str:
+    rows = {}
+    for run in provenance["runs"]:
+        rows = {
+            "versions": ", ".join(f"{k} {v}" for k, v in run["versions"].items()),
+            "Python": run["python"],
+            "system": run["platform"],
+            "CPU": f"{run['cpu']} ({run['cores']} cores)",
+            "wall time": f"{run.get('wall_time_s', float('nan')):g} s",
+        }
     cells = "".join(
         f"<tr><th>{html.escape(k)}</th><td style='text-align:left'>{html.escape(str(v))}</td></tr>"
         for k, v in rows.items()
@@ -219,19 +224,14 @@ def _provenance(config: Any) -> str:
 
 def _figure(found: Mapping[str, Figure], name: str) -> str:
     """A figure as an inline SVG picture with its caption."""
-    data, text = base64.b64encode(_svg(found[name])).decode(), html.escape(_CAPTIONS[name])
+    data, text = (
+        base64.b64encode(figure_bytes(found[name], "svg")).decode(),
+        html.escape(_CAPTIONS[name]),
+    )
     return (
         f'<figure><img alt="{text}" src="data:image/svg+xml;base64,{data}">'
         f"<figcaption>{text}</figcaption></figure>"
     )
-
-
-def _svg(figure: Figure) -> bytes:
-    """A figure as SVG, the same bytes each time."""
-    buffer = io.BytesIO()
-    with rc_context({"svg.hashsalt": "pronk_pin"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return buffer.getvalue()
 
 
 def _count(value: float) -> str:

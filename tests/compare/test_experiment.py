@@ -89,7 +89,7 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
         (
             {"controllers": ("pd", "lqr")},
             "unknown controller 'lqr'; choose one of: "
-            "pd, ilc, model, library, model+ilc, ilc-paper",
+            "pd, ilc, model, library, model+ilc, ilc-stance",
         ),
         (
             {"scenarios": ("moon",)},
@@ -156,7 +156,8 @@ def test_the_library_is_the_mean_of_what_was_learned_in_the_end(comparison: Resu
     )
     np.testing.assert_allclose(library.torque[:, :, ::4], mean, atol=1e-4)
     between = 0.5 * (library.torque[:, :, :-1:4] + library.torque[:, :, 4::4])
-    np.testing.assert_allclose(library.torque[:, :, 2::4], between, atol=1e-4)
+    bend = np.abs(library.torque[:, :, 2::4] - between)
+    assert 0.0 < bend.max() < 0.5  # smooth between the samples, not straight
 
 
 def test_the_library_repeats_what_was_learned(comparison: Results) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import ast
 import dataclasses
 import math
 from dataclasses import replace
@@ -172,8 +173,8 @@ def test_a_contact_stiffer_than_the_time_step_allows_is_refused(value: float) ->
         ({"slope": 0.6}, "a slope beyond 0.5 rad is not for legs"),
         ({"slope": math.nan}, "a slope beyond 0.5 rad is not for legs"),
         ({"step_height": 0.2}, "half as high as they are long"),
-        ({"full_torque_speed": 20.0, "no_load_speed": 10.0}, "from 0 to no_load_speed"),
-        ({"full_torque_speed": 20.0, "no_load_speed": 20.0}, "greater than full_torque_speed"),
+        ({"full_torque_speed": 20.0, "no_load_speed": 10.0}, "less than no_load_speed"),
+        ({"full_torque_speed": 20.0, "no_load_speed": 20.0}, "less than no_load_speed"),
         ({"push_duration": 5.0}, "shorter than push_period"),
         ({"payload_position": (0.0, 1.0)}, "payload_position must be three finite numbers"),
         ({"com_shift": (0.0, 0.0, math.nan)}, "com_shift must be three finite numbers"),
@@ -183,6 +184,13 @@ def test_a_contact_stiffer_than_the_time_step_allows_is_refused(value: float) ->
 def test_a_world_that_cannot_be_is_refused(wrong: dict[str, Any], text: str) -> None:
     with pytest.raises(InvalidInput, match=f"scenario 'mine': .*{text}"):
         Scenario("mine", **wrong)
+
+
+@pytest.mark.parametrize("name", ["nominal", "noise+slow-motors", "random-0-0"])
+def test_a_scenario_is_read_again_from_what_results_say_of_it(name: str) -> None:
+    scenario = load_scenario(name)
+    said = repr(dataclasses.asdict(scenario))
+    assert Scenario(**ast.literal_eval(said)) == scenario
 
 
 def test_gravity_leans_back_on_a_slope_and_keeps_its_size() -> None:
