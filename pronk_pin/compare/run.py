@@ -21,6 +21,7 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from ..control import load_controller
 from ..errors import FileProblem, InvalidInput, WorkerLost
 from .executors import Crew, connect, count_steps, processes
 from .experiment import PRACTISED, Cell, Experiment, run_cell
@@ -185,7 +186,11 @@ class _Run:
                     self._save(cell, future.result())
 
     def _practised(self, cell: Cell) -> xr.Dataset | None:
-        return self.results.strides(cell.practised, PRACTISED) if cell.practised else None
+        if cell.practised is None:
+            return None
+        # Identification reads every tick; a library is made of a few variables.
+        explains = load_controller(cell.controller).source == "identified"
+        return self.results.strides(cell.practised, None if explains else PRACTISED)
 
     def _save(self, cell: Cell, made: Made) -> None:
         self.results.save(cell, made.strides)

@@ -49,7 +49,8 @@ class Scenario:
         coulomb: Coulomb friction in the joints, added [N m].
         torque_constant: Torque that a motor gives, over the torque it is asked for.
         full_torque_speed: Joint speed up to which a motor gives its greatest torque [rad/s].
-        no_load_speed: Joint speed at which it gives none any more, falling linearly [rad/s].
+        no_load_speed: Joint speed at which it gives none any more, falling linearly [rad/s]; None
+            where speed does not matter.
         delay: Time from a command to its torque [s], a whole number of time steps.
         payload: Mass fixed to the trunk [kg].
         payload_position: Where the payload sits, in the trunk's frame [m].
@@ -75,8 +76,8 @@ class Scenario:
     damping: float = 0.0
     coulomb: float = 0.0
     torque_constant: float = 1.0
-    full_torque_speed: float = math.inf
-    no_load_speed: float = math.inf
+    full_torque_speed: float = 0.0
+    no_load_speed: float | None = None
     delay: float = 0.0
     payload: float = 0.0
     payload_position: Vector = (0.0, 0.0, 0.06)
@@ -146,10 +147,9 @@ class Scenario:
             raise self._wrong("steps are at most half as high as they are long")
 
     def _check_motors(self) -> None:
-        if not 0.0 <= self.full_torque_speed <= self.no_load_speed:
-            raise self._wrong("full_torque_speed must be from 0 to no_load_speed")
-        if self.no_load_speed == self.full_torque_speed != math.inf:
-            raise self._wrong("no_load_speed must be greater than full_torque_speed")
+        no_load = math.inf if self.no_load_speed is None else self.no_load_speed
+        if not 0.0 <= self.full_torque_speed < no_load:
+            raise self._wrong("full_torque_speed must be 0 or more, and less than no_load_speed")
         steps = self.delay / self.timestep
         if not abs(steps - round(steps)) < 1e-6:
             raise self._wrong(
@@ -164,7 +164,7 @@ class Scenario:
     def affine(self) -> bool:
         """Whether servos can play a whole phase at once, with `World.play`: nothing comes between
         the tape and the torque but what is affine in the joints' angles and velocities."""
-        return self.delay == 0.0 and self.no_load_speed == math.inf and self.sensors.perfect
+        return self.delay == 0.0 and self.no_load_speed is None and self.sensors.perfect
 
     @property
     def pushes(self) -> bool:
