@@ -408,3 +408,35 @@ def test_intervals_hold_the_truth_in_nine_of_ten_random_worlds() -> None:
         seen = table[table["seen"]]
         inside.append(((seen["low"] <= seen["true"]) & (seen["true"] <= seen["high"])).mean())
     assert np.mean(inside) >= 0.9
+
+
+_NOMINAL = SCENARIOS["nominal"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "world",
+    [
+        _NOMINAL,
+        SCENARIOS["payload"],
+        dataclasses.replace(_NOMINAL, name="damping", damping=0.5),
+        dataclasses.replace(_NOMINAL, name="rotors", armature=0.018),
+        COMBINED,
+    ],
+    ids=lambda world: world.name,
+)
+def test_the_mended_gaits_keep_within_12_mrad_at_speeds_left_out(world: Scenario) -> None:
+    strides = with_noise(practise(world, speeds=(-0.5, -0.1, 0.3, 0.8)), np.random.default_rng(3))
+    table = close_loop(
+        explain(strides, imu_noise=IMU, rng=np.random.default_rng(4)),
+        strides,
+        speeds=(-0.45, -0.2, 0.05, 0.55, 0.75),
+        scenarios=[world],
+        controllers=("ilc", "identified+gait"),
+        progress=False,
+    )
+    mended = table[table["controller"] == "identified+gait"]
+    learned = table[table["controller"] == "ilc"]
+    assert mended["upright"].all()
+    assert mended[["thigh", "calf"]].to_numpy().max() < 0.012
+    assert mended["calf"].mean() < learned["calf"].mean()
