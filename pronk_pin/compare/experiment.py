@@ -147,12 +147,12 @@ def run_cell(
 def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     """The torque library learned in a simulation: means over its steady strides (section III.B)."""
     torque = steady(strides)["feedforward"].interp(phase=phase_grid())
-    torque = torque.transpose("speed", "stride", "phase", "joint")
+    torque = torque.transpose("speed", "stride", "part", "phase", "joint")
     return TorqueLibrary.from_strides(strides["speed"].to_numpy(), torque.to_numpy())
 
 
 def _feedforward(spec: ControllerSpec, cell: Cell, practised: xr.Dataset | None) -> Array | None:
-    """The feedforward that a controller begins with [N m], shape (n, samples, 12)."""
+    """The feedforward that a controller begins with [N m], (n, 2, samples, 12)."""
     if spec.source == "model":
         library = load_library(cell.robot)
         return model_feedforward(load_robot(cell.robot), [library.at(v) for v in cell.speeds])
@@ -163,7 +163,7 @@ def _feedforward(spec: ControllerSpec, cell: Cell, practised: xr.Dataset | None)
     return None
 
 
-def _attributes(cell: Cell) -> dict[str, str | int]:
+def _attributes(cell: Cell) -> dict[str, str | int | float]:
     scenario = dataclasses.asdict(load_scenario(cell.scenario))
     return {
         "robot": cell.robot,
@@ -172,4 +172,5 @@ def _attributes(cell: Cell) -> dict[str, str | int]:
         "controller": cell.controller,
         "seed": cell.seed,
         "scenario_parameters": repr(scenario),
+        "timestep": scenario["timestep"],
     }

@@ -89,7 +89,7 @@ def _rows(strides: xr.Dataset, k: int) -> Iterator[dict[str, object]]:
     yield row("apex_error", end["apex"].mean() - end["planned_apex"], "m")
     yield row("apex_deviation", end["apex"].std(), "m")
     yield row("stride_duration", end["duration"].mean(), "s")
-    yield row("feedback_share", feedback_share(end), "1")
+    yield row("feedback_share", feedback_share(end.sel(part="stance")), "1")
     if bool((mine["learning"] == 1).any()):
         settled = {joint: strides_to_converge(mine.isel(speed=0), joint) for joint in JOINTS[1:]}
         for joint, count in settled.items():

@@ -1,23 +1,102 @@
-"""What happened, stride by stride: preallocated, written at the events only."""
+"""What happened, tick by tick in one phase, and stride by stride; preallocated."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
 from .. import control
 from .._typing import Array, BoolArray, IntArray
-from ..control import PhaseLog, StrideRecord, phase_grid, resample
+from ..control import (
+    PARTS,
+    Gains,
+    PhaseLog,
+    StrideRecord,
+    Tape,
+    clip_torque,
+    phase_grid,
+    resample,
+)
 from ..gait import Gait
 from ..robot import NL
+from .world import Motion
 
-_EVERY = 2
+_EVERY = 4
 SAMPLES = (control.SAMPLES - 1) // _EVERY + 1
-"""Samples of the phase grid on which strides are kept: every second one of the control's."""
+"""Samples of the phase grid on which strides are kept: every fourth one of the control's."""
+
+LAST = 12
+"""Strides at the end that are kept tick by tick."""
 
 SHORTEST_STRIDE = 0.5
 """Strides shorter than this share of the planned duration do not occur: it sizes the log."""
+
+LONGEST_PART = 1.25
+"""Share of the planned duration of a part up to which its ticks are kept."""
+
+
+class TickLog:
+    """The phase that n robots are in, tick by tick; the next phase overwrites it.
+
+    Attributes:
+        size: Ticks of the longest phase.
+        joints, joint_rates: Measured joint angles and velocities, shape (n, size, 12).
+        feedback, feedforward, missing: Torques [N m], see `PhaseLog`, shape (n, size, 12).
+        base, base_rate: Trunk x, z [m] and their rates [m/s], shape (n, size, 2).
+        force: Ground's force on each foot, world frame [N], shape (n, size, 4, 3).
+    """
+
+    _STATES = ("joints", "joint_rates", "base", "base_rate", "force")
+    _TORQUES = ("feedback", "feedforward", "missing")
+
+    def __init__(self, n: int, size: int) -> None:
+        self.size = size
+        self.joints, self.joint_rates = np.zeros((2, n, size, NL))
+        self.feedback, self.feedforward, self.missing = np.zeros((3, n, size, NL))
+        self.base, self.base_rate = np.zeros((2, n, size, 2))
+        self.force = np.zeros((n, size, NL // 3, 3))
+
+    def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
+        """What robots did from a tick on."""
+        ticks = slice(tick, tick + motion.base.shape[1])
+        for name in self._STATES:
+            getattr(self, name)[rows, ticks] = getattr(motion, name)
+
+    def torques(
+        self, rows: IntArray, tape: Tape, gains: Gains, tau_max: Array, played: int
+    ) -> None:
+        """What the tapes that were played for so many ticks asked of the motors."""
+        ticks = slice(tape.begin, played)
+        feedforward = tape.feedforward[:, ticks]
+        feedback = gains.feedback(
+            tape.position[:, ticks] - self.joints[rows, ticks],
+            tape.velocity[:, ticks] - self.joint_rates[rows, ticks],
+        )
+        self.feedback[rows, ticks], self.feedforward[rows, ticks] = feedback, feedforward
+        given = clip_torque(feedback, feedforward, tau_max)
+        self.missing[rows, ticks] = given - feedback - feedforward
+
+    def phase(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+        """What the controller knows of a phase that has ended after so many ticks (m,)."""
+        ticks = slice(int(length.max()))
+        return PhaseLog(
+            self.joints[rows, ticks],
+            self.joint_rates[rows, ticks],
+            self.feedback[rows, ticks],
+            self.feedforward[rows, ticks],
+            self.missing[rows, ticks],
+            length,
+            felt,
+        )
+
+    def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
+        """So many ticks, from the ticks `start` (m,) on, are the first of the next phase."""
+        kept = start[:, None] + np.arange(ticks)  # (m, ticks)
+        for name in (*self._STATES, *self._TORQUES):
+            channel = getattr(self, name)
+            channel[rows, :ticks] = channel[rows[:, None], kept]
 
 
 class StrideLog:
@@ -29,78 +108,131 @@ class StrideLog:
         peak_error: Peak of the stance error [rad], shape (n, strides, 12).
         rms_error: Root mean square of the stance error [rad], shape (n, strides, 12).
         contact_error: Peak from the contact on, before it was felt [rad], shape (n, strides, 12).
-        curves: In stance the `error` [rad], `feedback` and `feedforward` [N m], in `flight` the
-            joint angles [rad], each of shape (n, strides, samples, 12).
-        base: Trunk x, z [m] in `stance` and `flight`, each of shape (n, strides, samples, 2).
+        curves: The `error` [rad], `feedback` and `feedforward` [N m] of stance and flight, each of
+            shape (n, strides, 2, samples, 12).
+        base: Trunk x, z [m], shape (n, strides, 2, samples, 2).
     """
 
     SCALARS = ("start", "duration", "stance", "speed", "apex", "upright", "learning", "skipped")
-    PHASES = ("stance", "flight")
-    CURVES = ("error", "feedback", "feedforward", "flight")
+    CURVES = ("error", "feedback", "feedforward")
+    TICKS: ClassVar = {
+        "joints": (NL,),
+        "joint_rates": (NL,),
+        "torque": (NL,),
+        "feedforward": (NL,),
+        "base": (2,),
+        "base_rate": (2,),
+        "force": (NL // 3, 3),
+    }
+    """What is kept of the last strides at every tick, with the shape of one tick."""
 
     def __init__(self, gaits: Sequence[Gait], duration: float, timestep: float) -> None:
         n = len(gaits)
-        planned = np.array([gait.duration for gait in gaits])
-        size = int(np.ceil(duration / (SHORTEST_STRIDE * planned.min())))
+        parts = [[getattr(gait, part).duration for gait in gaits] for part in PARTS]
+        self._planned = np.array(parts)  # (2, n)
+        whole = self._planned.sum(axis=0)
+        size = int(np.ceil(duration / (SHORTEST_STRIDE * whole.min()))) + 1
         self._timestep = timestep
-        self._open_x = np.zeros(n)
+        self._grid = phase_grid(SAMPLES)
+        self._begin_x = np.zeros(n)
         self.count = np.zeros(n, dtype=np.intp)
         self.scalars = {name: np.full((n, size), np.nan) for name in self.SCALARS}
         self.peak_error, self.rms_error, self.contact_error = np.full((3, n, size, NL), np.nan)
-        shape = (n, size, SAMPLES)
+        shape = (n, size, len(PARTS), SAMPLES)
         self.curves = {name: np.full((*shape, NL), np.nan, np.float32) for name in self.CURVES}
-        self.base = {name: np.full((*shape, 2), np.nan, np.float32) for name in self.PHASES}
+        self.base = np.full((*shape, 2), np.nan, np.float32)
+        # Strides are kept in turn, and only near the end of the simulation.
+        self._near = (LAST + 1) * LONGEST_PART * whole
+        self._close = np.zeros(n, dtype=bool)
+        ticks = int(np.ceil(LONGEST_PART * self._planned.max() / timestep))
+        shape = (n, LAST, len(PARTS), ticks)
+        self._ticks = {
+            name: np.full((*shape, *one), np.nan, np.float32) for name, one in self.TICKS.items()
+        }
 
-    def open(self, rows: IntArray, time: float, x: Array, *, learning: bool) -> None:
-        """A stride begins: touchdown at a time [s] and trunk position x (m,) [m]."""
+    def begin(self, rows: IntArray, start: Array, learning: BoolArray, *, left: Array) -> None:
+        """Strides begin at the times `start` (m,) [s], with `left` (m,) [s] to go."""
         at = (rows, self.count[rows])
-        self.scalars["start"][at], self.scalars["learning"][at] = time, learning
-        self._open_x[rows] = x
+        self.scalars["start"][at], self.scalars["learning"][at] = start, learning
+        self._close[rows] = left < self._near[rows]
 
-    def stance(self, rows: IntArray, record: StrideRecord, log: PhaseLog, base: Array) -> None:
-        """A stance has ended: its record, its log, and the trunk (m, ticks, 2)."""
+    def stance(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
+        """A stance of so many ticks (m,) has ended."""
         at = (rows, self.count[rows])
         self.peak_error[at] = np.abs(record.error).max(axis=1)
         self.rms_error[at] = np.sqrt(np.mean(record.error**2, axis=1))
         self.contact_error[at] = np.maximum(self.peak_error[at], record.contact_error)
-        self.scalars["stance"][at] = log.length * self._timestep
-        for name in ("error", "feedback", "feedforward"):
+        self.scalars["stance"][at] = length * self._timestep
+        self._begin_x[rows] = log.base[rows, 0, 0]
+        self._keep(0, rows, record, log, length)
+
+    def flight(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
+        """A flight of so many ticks (m,) has ended."""
+        ticks = np.arange(int(length.max()))
+        height = log.base[rows, : len(ticks), 1]
+        highest = np.where(ticks < length[:, None], height, -np.inf).max(axis=1)
+        self.scalars["apex"][rows, self.count[rows]] = highest
+        self._keep(1, rows, record, log, length)
+
+    def _keep(
+        self, part: int, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray
+    ) -> None:
+        """Curves of a part of the strides, and its ticks where the end is near."""
+        at = (rows, self.count[rows], part)
+        for name in self.CURVES:
             self.curves[name][at] = getattr(record, name)[:, ::_EVERY]
-        self.base["stance"][at] = _on_grid(base, log)
+        index = self._grid * self._planned[part, rows, None] / self._timestep
+        index = np.minimum(index, length[:, None] - 1.0)
+        self.base[at] = resample(log.base[rows, : int(length.max())], index)
+        close = self._close[rows]
+        if close.any():
+            self._keep_ticks(part, rows[close], log, length[close])
 
-    def flight(self, rows: IntArray, log: PhaseLog, base: Array) -> None:
-        """A flight has ended: its log, and the trunk (m, ticks, 2)."""
-        at = (rows, self.count[rows])
-        self.curves["flight"][at] = _on_grid(log.joints, log)
-        self.base["flight"][at] = _on_grid(base, log)
-        ticks = np.arange(base.shape[1])
-        height = np.where(ticks < log.length[:, None], base[..., 1], -np.inf)
-        self.scalars["apex"][at] = height.max(axis=1)
+    def _keep_ticks(self, part: int, rows: IntArray, log: TickLog, length: IntArray) -> None:
+        kept = (rows, self.count[rows] % LAST, part)
+        ticks = min(int(length.max()), self._ticks["base"].shape[3])
+        beyond = np.arange(ticks) >= length[:, None]
+        for name, store in self._ticks.items():
+            if name == "torque":
+                parts = (log.feedback, log.feedforward, log.missing)
+                values = np.sum([channel[rows, :ticks] for channel in parts], axis=0)
+            else:
+                values = getattr(log, name)[rows, :ticks].copy()
+            values[beyond] = np.nan
+            store[kept] = np.nan
+            store[(*kept, slice(ticks))] = values
 
-    def close(self, rows: IntArray, time: float, x: Array, upright: BoolArray) -> Array:
-        """A stride ends: touchdown at a time [s] and trunk position x (m,) [m].
+    def end(
+        self, rows: IntArray, duration: Array, x: Array, upright: BoolArray, skipped: IntArray
+    ) -> None:
+        """Strides have ended after so long (m,) [s], with the trunk at x (m,) [m].
 
-        Returns:
-            Durations of the strides [s], shape (m,).
+        Args:
+            rows: Whose.
+            duration: From touchdown to touchdown [s].
+            x: Where the trunk is [m].
+            upright: Whether they have not fallen.
+            skipped: Why nothing is learned from them, see `StrideSelection`.
         """
         at = (rows, self.count[rows])
-        duration = time - self.scalars["start"][at]
         self.scalars["duration"][at] = duration
-        self.scalars["speed"][at] = (x - self._open_x[rows]) / duration
+        self.scalars["speed"][at] = (x - self._begin_x[rows]) / duration
         self.scalars["upright"][at] = upright
+        self.scalars["skipped"][at] = skipped
         self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
-        return np.asarray(duration)
-
-    def judge(self, rows: IntArray, skipped: IntArray) -> None:
-        """Why nothing was learned from the strides that have just ended, see `StrideSelection`."""
-        made = self.count[rows] > 0
-        self.scalars["skipped"][rows[made], self.count[rows[made]] - 1] = skipped[made]
 
     def finish(self, upright: BoolArray) -> None:
         """The simulation has ended; a fall in an unfinished stride counts for the last finished."""
         self.scalars["upright"][np.arange(len(upright)), np.maximum(self.count - 1, 0)] = upright
 
+    def ticks(self) -> dict[str, Array]:
+        """The last strides at every tick, by name: shape (n, last, 2, ticks, ...), oldest first.
 
-def _on_grid(values: Array, log: PhaseLog) -> Array:
-    """Values (m, ticks, ...) over the time that the phase lasted, on the phase grid."""
-    return resample(values, log.index(phase_grid(SAMPLES)))
+        NaN where a part has ended, and before a robot's first stride.
+        """
+        order = (self.count[:, None] + np.arange(LAST)) % LAST  # (n, last)
+        rows = np.arange(len(order))[:, None]
+        sorted_ = {name: store[rows, order] for name, store in self._ticks.items()}
+        used = np.isfinite(sorted_["base"]).any(axis=(0, 1, 2, 4))
+        length = int(np.flatnonzero(used).max(initial=0)) + 1
+        return {name: values[:, :, :, :length] for name, values in sorted_.items()}

@@ -33,7 +33,7 @@ from .experiment import Cell, Experiment
 from .metrics import COLUMNS, KEYS, summarize
 from .simulate import Schedule
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the layout of a results folder."""
 
 _PACKAGES = ("pronk-pin", "pin", "example-robot-data", "mujoco", "proxsuite", "numpy", "scipy")

@@ -1,7 +1,6 @@
-"""One simulation: n robots, one controller, one world, at 1 kHz.
+"""One simulation: n robots, one controller, one world, at 1 kHz, from event to event.
 
-The state machine lives here. A stance ends by time, as its reference does; a flight ends with the
-touchdown that the feet feel.
+A stance ends by time, as its reference does; a flight ends with the touchdown that the feet feel.
 """
 
 from __future__ import annotations
@@ -13,19 +12,25 @@ from typing import TypeAlias
 import numpy as np
 
 from .._typing import Array, IntArray
-from ..control import Controller, ControllerSpec, PhaseLog, Player, phase_grid
+from ..control import Controller, ControllerSpec, Tape, clip_torque, phase_grid
 from ..errors import InvalidInput
 from ..gait import Gait
-from ..robot import NL, Robot
-from .record import StrideLog
+from ..robot import Robot
+from .record import StrideLog, TickLog
 from .scenario import Scenario
-from .world import World, without_warnings
+from .world import Motion, World, finite, without_warnings
 
 Progress: TypeAlias = Callable[[int], object]
 """Called with the number of time steps done since the last call."""
 
 _EARLIEST_TOUCHDOWN = 0.5
 """Phase of flight before which contact is the lift-off's, not a touchdown."""
+
+_EXPECTED_TOUCHDOWN = 0.9
+"""Phase of flight up to which it is played in one go."""
+
+_CHUNK = 20
+"""Ticks that are played in one go from then on; what comes after a touchdown is thrown away."""
 
 TOUCHDOWN_LOAD = 0.1
 """Share of the weight on the feet that counts as a touchdown."""
@@ -75,6 +80,10 @@ class Schedule:
 class Simulation:
     """n robots that pronk at their own speeds under one controller in one world.
 
+    All robots are played from event to event together, each on a clock of its own: one goes on in
+    its stride while another already waits for the next. Each makes as many strides as begin before
+    the end of the schedule.
+
     Args:
         robot: The robot.
         gaits: The gait of each of the n robots.
@@ -82,7 +91,10 @@ class Simulation:
         scenario: The world.
         schedule: What happens when.
         rng: Source of the scatter at the start.
-        feedforward: Feedforward to begin with [N m], shape (n, samples, 12).
+        feedforward: Feedforward to begin with [N m], shape (n, 2, samples, 12).
+        chunked: Let servos play whole tapes, as MuJoCo can where the law is affine between two
+            events; otherwise the feedback is computed tick by tick. The motion is the same.
+        threads: Threads that share the robots, see `World`.
     """
 
     def __init__(
@@ -95,35 +107,26 @@ class Simulation:
         schedule: Schedule,
         rng: np.random.Generator,
         feedforward: Array | None = None,
+        chunked: bool = True,
+        threads: int = 0,
     ) -> None:
         n, dt = len(gaits), scenario.timestep
         self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
         self.controller = Controller(robot, gaits, spec, timestep=dt, feedforward=feedforward)
-        self.world = World(robot, scenario, n)
-        ticks = self.controller.max_ticks
-        self._player = Player(n, ticks, spec.gains, robot.tau_max)
-        self._joints, self._rates = np.zeros((2, n, ticks, NL))
-        self._feedback, self._forward, self._missing = np.zeros((3, n, ticks, NL))
-        self._base = np.zeros((n, ticks, 2))
-        self._channels = (
-            self._joints,
-            self._rates,
-            self._feedback,
-            self._forward,
-            self._missing,
-            self._base,
-        )
+        self._gains, self._chunked, self._tau_max = spec.gains, chunked, robot.tau_max
+        servo = spec.gains if chunked else None
+        self.world = World(robot, scenario, n, servo=servo, threads=threads)
+        self._log = TickLog(n, self.controller.max_ticks)
         self._late = spec.touchdown_ticks
-        self._flying = np.zeros(n, dtype=bool)
-        self._rows = np.arange(n)
         self._load = TOUCHDOWN_LOAD * robot.mass * robot.gravity
-        self._earliest = np.array(
-            [_EARLIEST_TOUCHDOWN * gait.flight.duration / dt for gait in gaits]
-        )
+        flight = np.array([gait.flight.duration for gait in gaits])
+        self._earliest = np.round(_EARLIEST_TOUCHDOWN * flight / dt).astype(np.intp)
+        self._expected = np.round(_EXPECTED_TOUCHDOWN * flight / dt).astype(np.intp)
         heights = [gait.stance.base_reference(phase_grid())[0][:, 1] for gait in gaits]
         self._floor = _FALLEN * np.min(heights, axis=1)
         self.upright = np.ones(n, dtype=bool)
-        self.log = StrideLog(gaits, schedule.duration, dt)
+        self.strides = StrideLog(gaits, schedule.duration, dt)
+        self._clock = np.zeros(n, dtype=np.intp)  # ticks since the first stride began
         self._stand(robot, rng)
 
     def _stand(self, robot: Robot, rng: np.random.Generator) -> None:
@@ -140,98 +143,119 @@ class Simulation:
         Args:
             progress: Called with the number of steps done since the last call.
         """
+        schedule, dt = self.schedule, self._dt
+        steps = round((schedule.practice + schedule.learning) / dt)
+        done = 0
         with without_warnings():
             self._startup()
-            self._pronk(progress)
-        self.log.finish(self.upright)
-        return self.log
+            while (rows := np.flatnonzero(self._clock < steps)).size:
+                self._stride(rows, steps=steps)
+                if progress is not None:
+                    before, done = done, min(int(self._clock.mean()), steps)
+                    progress(done - before)
+        if progress is not None:
+            progress(steps - done)
+        self.strides.finish(self.upright)
+        return self.strides
 
     def _startup(self) -> None:
-        for _ in range(round(self.schedule.startup / self._dt)):
-            self._player.load(self._rows, self.controller.stand())
-            self._advance()
-        # The first stance begins as if its touchdown had been felt late, with the robots at rest.
-        self._joints[:, : self._late] = self.world.joints[:, None]
-        self._rates[:, : self._late] = self.world.joint_rates[:, None]
-        self._base[:, : self._late] = self.world.base[:, None]
-        self._begin_stance(self._rows, np.full(len(self._rows), np.inf), 0.0)
+        """Stand; the last ticks are as if the touchdown of the first stance had been felt late."""
+        rows, late = np.arange(len(self._gaits)), self._late
+        ticks = round(self.schedule.startup / self._dt) + late
+        for piece in np.array_split(np.arange(ticks), -(-ticks // self._log.size)):
+            self._play(rows, self.controller.stand(len(piece)))
+        self._log.rewind(rows, np.full(len(rows), len(piece) - late), late)
 
-    def _pronk(self, progress: Progress | None) -> None:
-        dt, schedule = self._dt, self.schedule
-        learns = self.controller.spec.law is not None
-        steps = round((schedule.practice + schedule.learning) / dt)
-        for step in range(steps):
-            time = step * dt
-            self.controller.learning = learns and time >= schedule.practice
-            self._advance()
-            self._events(time + dt)
-            if progress is not None and step % 500 == 499:
-                progress(500)
-        if progress is not None:
-            progress(steps % 500)
+    def _stride(self, rows: IntArray, *, steps: int) -> None:
+        """One stride, from touchdown to touchdown, of those robots."""
+        controller, strides, log, late = self.controller, self.strides, self._log, self._late
+        start = self._clock[rows]
+        learning = start >= round(self.schedule.practice / self._dt)
+        learning &= any(law is not None for law in controller.spec.laws)
+        strides.begin(rows, self._seconds(start), learning, left=self._seconds(steps - start))
 
-    def _advance(self) -> None:
-        """One tick: play the tapes, log, step the world."""
-        world, player = self.world, self._player
-        torque, feedback, feedforward = player.play(world.joints, world.joint_rates)
-        at = (self._rows, player.tick)
-        self._joints[at], self._rates[at] = world.joints, world.joint_rates
-        self._feedback[at], self._forward[at] = feedback, feedforward
-        self._missing[at] = torque - feedback - feedforward
-        self._base[at] = world.base
-        world.step(torque)
-        player.tick += 1
-        broken = ~world.finite
-        if broken.any():
-            world.restart(np.flatnonzero(broken))
-            self.upright &= ~broken
+        stance = self._play(rows, controller.touchdown(rows, learning))
+        tape, record = controller.liftoff(rows, log.phase(rows, stance, felt=late))
+        strides.stance(rows, record, log, stance)
 
-    def _events(self, time: float) -> None:
-        """Lift-offs by time, touchdowns by contact; who has fallen."""
-        player, world = self._player, self.world
-        over = player.tick >= player.length
-        landed = (world.force[:, :, 2].sum(axis=1) > self._load) & (player.tick > self._earliest)
-        too_low = world.base[:, 1] < self._floor
-        self.upright &= ~(too_low | (over & self._flying))  # or a touchdown missed
-        for rows, event in (
-            (np.flatnonzero(over & ~self._flying), self._begin_flight),
-            (np.flatnonzero((landed | over) & self._flying), self._end_flight),
-        ):
-            if rows.size:
-                event(rows, time)
+        # A touchdown is felt late: the last ticks of the flight's tape are the next stance's.
+        flight = self._play(rows, tape, airborne=True) - late
+        duration, upright = self._seconds(stance + flight), self.upright[rows]
+        record = controller.landing(rows, log.phase(rows, flight), duration, upright)
+        strides.flight(rows, record, log, flight)
+        log.rewind(rows, flight, late)
+        strides.end(rows, duration, log.base[rows, 0, 0], upright, controller.skipped[rows])
+        self._clock[rows] = start + stance + flight
 
-    def _begin_flight(self, rows: IntArray, time: float) -> None:
-        log = self._phase_log(rows, self._player.tick[rows], felt=self._late)
-        tape, record = self.controller.liftoff(rows, log)
-        self.log.stance(rows, record, log, self._base[rows])
-        self._player.load(rows, tape)
-        self._flying[rows] = True
+    def _seconds(self, ticks: IntArray) -> Array:
+        return np.asarray(ticks * self._dt, dtype=float)
 
-    def _end_flight(self, rows: IntArray, time: float) -> None:
-        # Felt late: the last ticks of the flight's tape are the first of the stance.
-        flown, touchdown = self._player.tick[rows] - self._late, time - self._late * self._dt
-        self.log.flight(rows, self._phase_log(rows, flown), self._base[rows])
-        felt = flown[:, None] + np.arange(self._late)  # (m, late)
-        for channel in self._channels:
-            channel[rows, : self._late] = channel[rows[:, None], felt]
-        duration = self.log.close(rows, touchdown, self._base[rows, 0, 0], self.upright[rows])
-        self._begin_stance(rows, duration, touchdown)
+    def _play(self, rows: IntArray, tape: Tape, *, airborne: bool = False) -> IntArray:
+        """Play tapes into the log until they end, or a flight's touchdown is felt.
 
-    def _begin_stance(self, rows: IntArray, duration: Array, touchdown: float) -> None:
-        tape = self.controller.touchdown(rows, duration, self.upright[rows])
-        self.log.judge(rows, self.controller.skipped[rows])
-        self._player.load(rows, tape)
-        self._flying[rows] = False
-        x = self._base[rows, 0, 0]
-        self.log.open(rows, touchdown, x, learning=self.controller.learning)
+        Returns:
+            How many ticks were played, shape (m,).
+        """
+        world, log = self.world, self._log
+        told = tape.setpoint(self._gains) if self._chunked else None
+        played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
+        while going.size:
+            who, end = rows[going], int(tape.length[going].max())
+            if told is None:
+                stop, control = tick + 1, self._torque(who, tape, going, tick)[:, None]
+            else:
+                stop = min(self._next_stop(who, tick), end) if airborne else end
+                control = told[going, tick:stop]
+            motion = world.play(who, control)
+            log.write(who, tick, motion)
+            played[going] = self._ends(who, motion, tick, tape.length[going], airborne)
+            world.advance(who, motion, np.minimum(played[going], stop) - tick)
+            self._restart_broken(who)
+            going, tick = going[played[going] > stop], stop
+        if airborne:
+            played = np.maximum(played, 1 + self._late)  # even if it broke before
+        log.torques(rows, tape, self._gains, self._tau_max, int(played.max()))
+        return played
 
-    def _phase_log(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
-        return PhaseLog(
-            self._joints[rows],
-            self._rates[rows],
-            self._feedback[rows],
-            self._forward[rows],
-            self._missing[rows],
-            length,
-            felt,
+    def _next_stop(self, rows: IntArray, tick: int) -> int:
+        """Up to which tick of a flight to play in one go."""
+        expected = int(self._expected[rows].min())
+        return expected if tick < expected else tick + _CHUNK
+
+    def _torque(self, rows: IntArray, tape: Tape, going: IntArray, tick: int) -> Array:
+        """Torques of the feedback law at one tick, shape (m, 12)."""
+        world, gains = self.world, self._gains
+        feedback = gains.feedback(
+            tape.position[going, tick] - world.joints[rows],
+            tape.velocity[going, tick] - world.joint_rates[rows],
         )
+        return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
+
+    def _ends(
+        self, rows: IntArray, motion: Motion, tick: int, length: IntArray, airborne: bool
+    ) -> IntArray:
+        """Ticks after which the phases end, beyond the motion where they do not end in it.
+
+        Robots that fall in it, or that miss their touchdown, are noted as such.
+        """
+        count = tick + 1 + np.arange(motion.base.shape[1])  # ticks played after each step
+        over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
+        if airborne:
+            load = motion.force[..., 2].sum(axis=-1) > self._load
+            over |= load & (count > self._earliest[rows, None])
+        over |= ~finite(motion.path[:, 1:])
+        ended = over.any(axis=1)
+        ends[ended] = count[np.argmax(over[ended], axis=1)]
+        too_low = motion.base[..., 1] < self._floor[rows, None]
+        fallen = (too_low & (count <= ends[:, None])).any(axis=1)
+        if airborne:
+            fallen |= ends == length
+        self.upright[rows] &= ~fallen
+        return ends
+
+    def _restart_broken(self, rows: IntArray) -> None:
+        """Put robots that left the finite numbers back to rest; they have fallen."""
+        broken = rows[~finite(self.world.state[rows])]
+        if broken.size:
+            self.world.restart(broken)
+            self.upright[broken] = False

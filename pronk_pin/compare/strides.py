@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from ..control import SKIPPED, phase_grid
+from ..control import PARTS, SKIPPED, phase_grid
 from ..gait import Gait
 from ..robot import Robot
 from .record import SAMPLES, StrideLog
@@ -29,25 +29,37 @@ _UNITS = {
     "peak_error": ("rad", "peak of the stance error against the unmodified reference"),
     "rms_error": ("rad", "root mean square of the stance error"),
     "contact_error": ("rad", "peak of the stance error from the contact on, before it was felt"),
-    "error": ("rad", "reference minus measured joint angle in stance"),
-    "feedback": ("N m", "torque of the feedback in stance"),
-    "feedforward": ("N m", "torque of the feedforward in stance"),
-    "flight": ("rad", "measured joint angle in flight"),
-    "base_stance": ("m", "trunk position in stance"),
-    "base_flight": ("m", "trunk position in flight"),
-    "reference": ("rad", "reference joint angle in stance"),
+    "error": ("rad", "reference minus measured joint angle"),
+    "feedback": ("N m", "torque of the feedback"),
+    "feedforward": ("N m", "torque of the feedforward"),
+    "base": ("m", "trunk position"),
+    "reference": ("rad", "joint angle of the gait"),
     "planned_apex": ("m", "apex of the gait"),
-    "planned_duration": ("s", "duration of the gait's stride"),
+    "planned_duration": ("s", "duration of the gait's stance and flight"),
+    "tick_joints": ("rad", "measured joint angle at each tick"),
+    "tick_joint_rates": ("rad/s", "measured joint velocity at each tick"),
+    "tick_torque": ("N m", "torque that the motor was told, within its limits"),
+    "tick_feedforward": ("N m", "feedforward in it"),
+    "tick_base": ("m", "trunk position at each tick"),
+    "tick_base_rate": ("m/s", "trunk velocity at each tick"),
+    "tick_force": ("N", "ground's force on the foot, world frame"),
 }
 
 
 def to_dataset(
-    log: StrideLog, robot: Robot, gaits: Sequence[Gait], *, attributes: Mapping[str, str | int]
+    log: StrideLog,
+    robot: Robot,
+    gaits: Sequence[Gait],
+    *,
+    attributes: Mapping[str, str | int | float],
 ) -> xr.Dataset:
     """Label the strides of a simulation.
 
-    Dimensions: `speed`, `stride` (from 0), `phase` (0 to 1 within stance or flight), `joint`
-    (by name, in Pinocchio's order), `axis` (x, z). Unfinished strides are cut off.
+    Dimensions: `speed`, `stride` (from 0), `part` ("stance", "flight"), `phase` (t / T of the
+    reference, 0 to 1), `joint` (by name, in Pinocchio's order), `axis` (x, z). Unfinished strides
+    are cut off. Variables that begin with `tick_` hold the last strides at every tick (`tick`, of
+    `tick` times the attribute `timestep`; `foot`, `direction`), NaN after the end of a part; a
+    state is that before the tick, a torque and a force act during it.
     """
     last = int(log.count.max(initial=0))
     recorded = {
@@ -55,21 +67,26 @@ def to_dataset(
         for name, (dimensions, values) in _recorded(log).items()
     }
     grid = phase_grid(SAMPLES)
-    reference = np.stack([gait.stance.joint_reference(grid)[0] for gait in gaits])
+    parts = [[getattr(gait, part) for part in PARTS] for gait in gaits]
+    reference = [[part.joint_reference(grid)[0] for part in gait] for gait in parts]
     dataset = xr.Dataset(
         {
             "count": ("speed", log.count),
             "planned_apex": ("speed", [gait.apex for gait in gaits]),
-            "planned_duration": ("speed", [gait.duration for gait in gaits]),
-            "reference": (("speed", "phase", "joint"), reference),
+            "planned_duration": (("speed", "part"), [[p.duration for p in g] for g in parts]),
+            "reference": (("speed", "part", "phase", "joint"), np.array(reference)),
             **recorded,
+            **_ticks(log),
         },
         coords={
             "speed": ("speed", [gait.speed for gait in gaits], {"units": "m/s"}),
             "stride": np.arange(last),
+            "part": list(PARTS),
             "phase": ("phase", grid, {"units": "1"}),
             "joint": [name.removesuffix("_joint") for name in robot.joint_names],
             "axis": ["x", "z"],
+            "foot": list(robot.legs),
+            "direction": ["x", "y", "z"],
         },
         attrs=dict(attributes),
     )
@@ -89,7 +106,7 @@ def to_dataset(
 def _recorded(log: StrideLog) -> dict[str, _Variable]:
     """What the log holds, by name, with its dimensions."""
     per_stride, per_joint = ("speed", "stride"), ("speed", "stride", "joint")
-    curve, path = (*per_stride, "phase", "joint"), (*per_stride, "phase", "axis")
+    curve, path = (*per_stride, "part", "phase", "joint"), (*per_stride, "part", "phase", "axis")
     names = {"speed": "mean_speed"}  # the desired one is the coordinate
     return {
         **{names.get(name, name): (per_stride, array) for name, array in log.scalars.items()},
@@ -97,5 +114,14 @@ def _recorded(log: StrideLog) -> dict[str, _Variable]:
         "rms_error": (per_joint, log.rms_error),
         "contact_error": (per_joint, log.contact_error),
         **{name: (curve, array) for name, array in log.curves.items()},
-        **{f"base_{name}": (path, array) for name, array in log.base.items()},
+        "base": (path, log.base),
+    }
+
+
+def _ticks(log: StrideLog) -> dict[str, _Variable]:
+    """The last strides at every tick, with dimensions."""
+    trailing = {"base": ("axis",), "base_rate": ("axis",), "force": ("foot", "direction")}
+    return {
+        f"tick_{name}": (("speed", "last", "part", "tick", *trailing.get(name, ("joint",))), array)
+        for name, array in log.ticks().items()
     }

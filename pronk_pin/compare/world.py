@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import mujoco
 import mujoco.rollout
@@ -17,6 +18,7 @@ import pinocchio as pin
 
 from .._typing import Array, BoolArray, IntArray
 from .._urdf import mujoco_spec
+from ..control import Gains
 from ..robot import Robot
 from .scenario import Scenario
 
@@ -24,13 +26,16 @@ _FLOOR = "floor"
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
-def build_model(robot: Robot, scenario: Scenario, *, free: bool = False) -> mujoco.MjModel:
+def build_model(
+    robot: Robot, scenario: Scenario, *, free: bool = False, servo: Gains | None = None
+) -> mujoco.MjModel:
     """Compile the robot in its world.
 
     Args:
         robot: The robot, whose URDF is used.
         scenario: What the world adds to the URDF.
         free: Leave the trunk its six degrees of freedom instead of x and z only.
+        servo: Gains of servos at the joints, see `World`; without them torque motors.
     """
     spec = mujoco_spec(robot)
     spec.option.timestep = scenario.timestep
@@ -50,7 +55,7 @@ def build_model(robot: Robot, scenario: Scenario, *, free: bool = False) -> mujo
         for name, axis in (("x", [1, 0, 0]), ("z", [0, 0, 1])):
             trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     _add_payload(trunk, scenario)
-    _add_motors(spec, robot, scenario)
+    _add_motors(spec, robot, scenario, servo)
     _name_feet(spec, robot)
     _add_ground(spec, robot, scenario)
     return spec.compile()
@@ -76,19 +81,26 @@ def _add_payload(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
     trunk.inertia, trunk.iquat = principal, quaternion
 
 
-def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
-    """A torque motor at every joint, with the friction and the rotor that the URDF leaves out."""
-    for name in robot.urdf_joint_names:
+def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario, servo: Gains | None) -> None:
+    """A motor at every joint, with the friction and the rotor that the URDF leaves out."""
+    constant = scenario.torque_constant
+    for index, name in enumerate(robot.joint_names):
         joint = spec.joint(name)
         joint.armature = scenario.armature
         joint.damping = [scenario.damping, 0, 0]
         joint.frictionloss = scenario.coulomb
         # The default time constant of 0.02 s would smear Coulomb friction into a damper.
         joint.solref_friction = [0.002, 1]
-        joint.actfrclimited = False  # the limit is the controller's business
+        joint.actfrclimited = False  # the limit is the controller's or the servo's business
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        motor.gainprm = [scenario.torque_constant] + [0] * 9
+        motor.gainprm = [constant] + [0] * 9
         motor.biasprm = [0] * 10
+        if servo is not None:
+            kp, kd = servo.proportional[index], servo.derivative[index]
+            motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+            motor.biasprm = [0.0, -constant * kp, -constant * kd] + [0] * 7
+            limit = constant * robot.tau_max[index]
+            motor.forcerange, motor.forcelimited = [-limit, limit], True
 
 
 def _name_feet(spec: mujoco.MjSpec, robot: Robot) -> None:
@@ -143,37 +155,71 @@ def without_warnings() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
+class Motion(NamedTuple):
+    """What m robots did over some ticks; a state is that before the tick's step."""
+
+    base: Array
+    """Trunk x and z in the world [m], shape (m, ticks, 2)."""
+    base_rate: Array
+    """Their rates [m/s], shape (m, ticks, 2)."""
+    joints: Array
+    """Joint angles [rad], shape (m, ticks, 12)."""
+    joint_rates: Array
+    """Joint velocities [rad/s], shape (m, ticks, 12)."""
+    force: Array
+    """Ground's force on each foot, world frame [N], shape (m, ticks, 4, 3)."""
+    path: Array
+    """MuJoCo's full physics states, and the one after the last tick, (m, ticks + 1, nstate)."""
+
+
 class World:
-    """n robots, each alone in the same world, stepped together.
+    """n robots, each alone in the same world.
+
+    Args:
+        robot: The robot.
+        scenario: The world.
+        n: Number of robots.
+        servo: Gains of servos at the joints, which are then told set points (see
+            `Tape.setpoint`) and keep to the motors' limits themselves; without them the motors
+            are told torques.
+        threads: Threads that share the robots; by default the caller's only, so that batches run
+            side by side in processes.
 
     Attributes:
         base: Trunk x and z in the world [m], shape (n, 2).
         base_rate: Their rates [m/s], shape (n, 2).
         joints: Joint angles [rad], shape (n, 12).
         joint_rates: Joint velocities [rad/s], shape (n, 12).
-        force: Ground's force on each foot, world frame [N], shape (n, 4, 3); as MuJoCo's sensors
-            give it, of the instant before the last step.
+        force: Ground's force on each foot during the last step, world frame [N], (n, 4, 3).
     """
 
-    def __init__(self, robot: Robot, scenario: Scenario, n: int) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        scenario: Scenario,
+        n: int,
+        *,
+        servo: Gains | None = None,
+        threads: int = 0,
+    ) -> None:
         self.robot, self.scenario, self.n = robot, scenario, n
-        self.model = build_model(robot, scenario)
+        self.model = build_model(robot, scenario, servo=servo)
         # rollout without checks wants one model a robot, and one data a thread.
-        self._models, self._data = [self.model] * n, [mujoco.MjData(self.model)]
-        # Without threads of its own: batches run side by side in processes.
-        self._rollout = mujoco.rollout.Rollout(nthread=0)
+        self._models = [self.model] * n
+        self._data = [mujoco.MjData(self.model) for _ in range(max(threads, 1))]
+        self._rollout = mujoco.rollout.Rollout(nthread=threads)
         model = self.model
-        self._qpos = np.array([model.joint(name).qposadr[0] for name in robot.joint_names])
-        self._qvel = np.array([model.joint(name).dofadr[0] for name in robot.joint_names])
+        nq = model.nq
+        self._qpos = np.array([1 + model.joint(name).qposadr[0] for name in robot.joint_names])
+        self._qvel = np.array([1 + nq + model.joint(name).dofadr[0] for name in robot.joint_names])
         self._ctrl = np.array([model.actuator(name).id for name in robot.joint_names])
-        self._base = np.array([model.joint(name).qposadr[0] for name in ("x", "z")])
-        self._base_rate = np.array([model.joint(name).dofadr[0] for name in ("x", "z")])
+        self._base = np.array([1 + model.joint(name).qposadr[0] for name in ("x", "z")])
+        self._base_rate = np.array([1 + nq + model.joint(name).dofadr[0] for name in ("x", "z")])
         address = [model.sensor(name).adr[0] for name in robot.foot_names]
         self._force = np.array(address)[:, None] + np.arange(3)
-        self._state = np.zeros((n, 1, mujoco.mj_stateSize(model, _FULL)))
-        self._sensors = np.zeros((n, 1, model.nsensordata))
-        self._control = np.zeros((n, 1, model.nu))
+        self._state = np.zeros((n, mujoco.mj_stateSize(model, _FULL)))
         self._warmstart = np.zeros((n, model.nv))
+        self.force = np.zeros((n, *self._force.shape))
         self.reset(np.zeros((n, 2)), np.tile(robot.standing[7:], (n, 1)))
 
     def reset(
@@ -191,56 +237,96 @@ class World:
             base_rate: Rates of the trunk's x and z [m/s], shape (n, 2).
             joint_rates: Joint velocities [rad/s], shape (n, 12).
         """
-        state, nq = self._state[:, 0], self.model.nq
+        state = self._state
         state[:] = 0.0
-        state[:, 1 + self._base] = base
-        state[:, 1 + self._qpos] = joints
-        state[:, 1 + nq + self._base_rate] = base_rate
-        state[:, 1 + nq + self._qvel] = joint_rates
-        self._warmstart[:] = 0.0
-        self._sensors[:] = 0.0
-        self._read()
+        state[:, self._base], state[:, self._qpos] = base, joints
+        state[:, self._base_rate], state[:, self._qvel] = base_rate, joint_rates
+        self._warmstart[:], self.force[:] = 0.0, 0.0
 
-    def step(self, tau: Array) -> None:
-        """Advance every robot by one time step under motor torques (n, 12) [N m]."""
-        model = self.model
-        self._control[:, 0, self._ctrl] = tau
-        before = self._state[:, 0, 1 + model.nq :].copy()
+    def play(self, rows: IntArray, control: Array) -> Motion:
+        """What robots would do under controls (m, ticks, 12) of their motors or servos [N m].
+
+        They stay where they are until `advance` says how far they go.
+        """
+        m, ticks = control.shape[:2]
+        path = np.empty((m, ticks + 1, self._state.shape[1]))
+        path[:, 0] = self._state[rows]
+        told = np.empty((m, ticks, self.model.nu))
+        told[..., self._ctrl] = control
+        states = np.empty((m, ticks, path.shape[2]))
+        sensors = np.empty((m, ticks, self.model.nsensordata))
         self._rollout.rollout(
-            self._models,
+            self._models[:m],
             self._data,
-            self._state[:, 0].copy(),
-            self._control,
+            path[:, 0].copy(),
+            told,
             skip_checks=True,
-            nstep=1,
-            initial_warmstart=self._warmstart,
-            state=self._state,
-            sensordata=self._sensors,
+            nstep=ticks,
+            initial_warmstart=self._warmstart[rows],
+            state=states,
+            sensordata=sensors,
         )
-        self._warmstart = (self._state[:, 0, 1 + model.nq :] - before) / model.opt.timestep
-        self._read()
+        path[:, 1:] = states
+        before = path[:, :-1]
+        return Motion(
+            base=before[..., self._base],
+            base_rate=before[..., self._base_rate],
+            joints=before[..., self._qpos],
+            joint_rates=before[..., self._qvel],
+            # The sensors are of the state before each step, and have the floor's side of it.
+            force=-sensors[..., self._force],
+            path=path,
+        )
 
-    def _read(self) -> None:
-        position = self._state[:, 0, 1 : 1 + self.model.nq]
-        rate = self._state[:, 0, 1 + self.model.nq :]
-        self.base, self.base_rate = position[:, self._base], rate[:, self._base_rate]
-        self.joints, self.joint_rates = position[:, self._qpos], rate[:, self._qvel]
-        self.force = -self._sensors[:, 0][:, self._force]  # the sensor has the floor's side of it
+    def advance(self, rows: IntArray, motion: Motion, ticks: IntArray) -> None:
+        """Let robots go so many ticks (m,) along a motion that they `play`; 1 or more each."""
+        m = np.arange(len(rows))
+        self.force[rows] = motion.force[m, ticks - 1]
+        self._state[rows] = motion.path[m, ticks]
+        rates = slice(1 + self.model.nq, None)
+        last = motion.path[m, ticks, rates] - motion.path[m, ticks - 1, rates]
+        self._warmstart[rows] = last / self.model.opt.timestep
+
+    def step(self, tau: Array) -> Motion:
+        """Advance every robot by one time step under controls (n, 12) of its motors [N m]."""
+        rows = np.arange(self.n)
+        motion = self.play(rows, tau[:, None])
+        self.advance(rows, motion, np.ones(self.n, dtype=np.intp))
+        return motion
+
+    @property
+    def base(self) -> Array:
+        """See the class."""
+        return self._state[:, self._base]
+
+    @property
+    def base_rate(self) -> Array:
+        """See the class."""
+        return self._state[:, self._base_rate]
+
+    @property
+    def joints(self) -> Array:
+        """See the class."""
+        return self._state[:, self._qpos]
+
+    @property
+    def joint_rates(self) -> Array:
+        """See the class."""
+        return self._state[:, self._qvel]
 
     @property
     def state(self) -> Array:
         """MuJoCo's full physics state of each robot, a copy, shape (n, nstate)."""
-        return self._state[:, 0].copy()
-
-    @property
-    def finite(self) -> BoolArray:
-        """Which robots still have finite states, none huge (MuJoCo's limit), shape (n,)."""
-        return np.asarray((np.abs(self._state[:, 0]) < mujoco.mjMAXVAL).all(axis=1))
+        return self._state.copy()
 
     def restart(self, rows: IntArray) -> None:
         """Put robots that left the finite numbers back to rest, so that the others go on."""
-        self._state[rows, 0] = 0.0
-        self._state[rows[:, None], 0, 1 + self._qpos] = self.robot.standing[7:]
-        self._state[rows, 0, 1 + self._base[1]] = self.robot.standing[2]
+        self._state[rows] = 0.0
+        self._state[rows[:, None], self._qpos] = self.robot.standing[7:]
+        self._state[rows, self._base[1]] = self.robot.standing[2]
         self._warmstart[rows] = 0.0
-        self._read()
+
+
+def finite(path: Array) -> BoolArray:
+    """Which of the states (..., nstate) are finite, with nothing huge (MuJoCo's limit)."""
+    return np.asarray((np.abs(path) < mujoco.mjMAXVAL).all(axis=-1))

@@ -16,13 +16,14 @@ from .learning import (
 )
 from .lifted import LiftedModel
 from .linearise import Settings, lifted_model
-from .record import SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
+from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
-from .tape import Gains, Player, Tape
+from .tape import Gains, Tape, clip_torque
 from .torque_library import TorqueLibrary
 
 __all__ = [
     "CONTROLLERS",
+    "PARTS",
     "SAMPLES",
     "SKIPPED",
     "Controller",
@@ -38,7 +39,6 @@ __all__ = [
     "PaperILC",
     "PhaseLog",
     "PlantInversionILC",
-    "Player",
     "Settings",
     "StrideRecord",
     "StrideSelection",
@@ -46,6 +46,7 @@ __all__ = [
     "TorqueLibrary",
     "ZeroPhaseFilter",
     "anti_windup",
+    "clip_torque",
     "lifted_model",
     "load_controller",
     "phase_grid",

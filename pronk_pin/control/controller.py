@@ -1,7 +1,7 @@
 """The controller: a tape at every event, learning at every touchdown.
 
-Control of n robots that pronk at their own speeds. The state machine and the clock belong to
-whoever plays the tapes; the controller is called at the events and answers with the next tape.
+Control of n robots that pronk at their own speeds. The events and the clock belong to whoever plays
+the tapes; the controller is called at each touchdown, lift-off and landing of a stride.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 from .._state import known_name
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
-from ..gait import Gait
+from ..gait import Gait, GaitPhase
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
 from .estimation import SpeedEstimator
 from .filters import ZeroPhaseFilter
 from .learning import (
+    SKIPPED,
     CurrentIterationILC,
     LearningLaw,
     ModelBasedILC,
@@ -30,7 +31,7 @@ from .learning import (
     given,
 )
 from .linearise import Settings, lifted_model
-from .record import SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
+from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
 
@@ -48,7 +49,8 @@ class ControllerSpec:
     Attributes:
         name: Short name, as on the command line.
         source: Where its feedforward comes from at first: "none", "model" or "library".
-        law: Learning law that is switched on later, if any.
+        law: Learning law of the stance that is switched on later, if any.
+        flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
         selection: Strides worth learning from.
@@ -60,6 +62,7 @@ class ControllerSpec:
     name: str
     source: str = "none"
     law: LearningLaw | None = None
+    flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
     selection: StrideSelection = field(default_factory=StrideSelection)
@@ -70,6 +73,11 @@ class ControllerSpec:
         known_name("source of feedforward", self.source, SOURCES)
         if self.touchdown_ticks < 1:
             raise InvalidInput("touchdown_ticks must be 1 or more: contacts are sensed a tick late")
+
+    @property
+    def laws(self) -> tuple[LearningLaw | None, ...]:
+        """The learning laws, in the order of `PARTS`."""
+        return self.law, self.flight_law
 
 
 CONTROLLERS = {
@@ -97,13 +105,46 @@ def load_controller(name: str) -> ControllerSpec:
     return CONTROLLERS[known_name("controller", name, CONTROLLERS)]
 
 
+@dataclass(frozen=True)
+class _Reference:
+    """What n gaits ask for in one part of the stride, at each tick.
+
+    Attributes:
+        duration: Planned durations [s], shape (n,).
+        ticks: Ticks after which the part ends at the latest, shape (n,).
+        phase: Phase s at each tick, held at 1, shape (n, ticks).
+        position: Joint angles [rad], shape (n, ticks, 12).
+        velocity: Joint velocities [rad/s], zero where the phase is held, shape (n, ticks, 12).
+    """
+
+    duration: Array
+    ticks: IntArray
+    phase: Array
+    position: Array
+    velocity: Array
+
+    @classmethod
+    def of(cls, phases: Sequence[GaitPhase], timestep: float, latest: float) -> _Reference:
+        """Tabulate one phase of each gait, for up to `latest` times its planned duration."""
+        duration = np.array([phase.duration for phase in phases])
+        ticks = np.round(latest * duration / timestep).astype(np.intp)
+        s = np.minimum(np.arange(ticks.max()) * timestep / duration[:, None], 1.0)
+        curves = [phase.joint_reference(row) for phase, row in zip(phases, s, strict=True)]
+        velocity = np.stack([rate for _, rate in curves])
+        # Past its planned end a flight holds the posture of touchdown.
+        velocity[s >= 1.0] = 0.0
+        return cls(duration, ticks, s, np.stack([angle for angle, _ in curves]), velocity)
+
+
 class Controller:
     """Runs one `ControllerSpec` on n robots, each with its own gait.
 
+    A stride is `touchdown`, then `liftoff` with what was measured in stance, then `landing` with
+    what was measured in flight.
+
     Attributes:
-        feedforward: The feedforward in use, on the phase grid of stance [N m], shape
-            (n, samples, 12).
-        learning: Whether the law is switched on.
+        feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
+            (n, 2, samples, 12).
         skipped: Why the robots' last strides are not worth learning from, index into `SKIPPED`,
             shape (n,).
     """
@@ -118,133 +159,133 @@ class Controller:
         feedforward: Array | None = None,
     ) -> None:
         n = len(gaits)
+        shape = (n, len(PARTS), SAMPLES, NL)
         if feedforward is None:
-            feedforward = np.zeros((n, SAMPLES, NL))
-        if feedforward.shape != (n, SAMPLES, NL):
+            feedforward = np.zeros(shape)
+        if feedforward.shape != shape:
             raise InvalidInput(
-                f"a feedforward of shape {feedforward.shape}; expected {(n, SAMPLES, NL)}: "
-                "torques on the phase grid of stance for each gait"
+                f"a feedforward of shape {feedforward.shape}; expected {shape}: "
+                "torques on the phase grids of stance and flight for each gait"
             )
         self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
         self.feedforward = feedforward.copy()
-        self.learning = False
         self._timestep = timestep
-        self.skipped = np.zeros(n, dtype=np.intp)
-        self._last = StrideRecord.unknown(n)
+        self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
+        self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
-        self._law = spec.law
+        self._laws = list(spec.laws)
         if isinstance(spec.law, ModelBasedILC):
             settings = Settings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
             )
-            self._law = spec.law.along([lifted_model(robot, gait, settings) for gait in gaits])
-        self._tabulate()
-
-    def _tabulate(self) -> None:
-        """References at the ticks, for all robots at once: shapes (n, ticks, 12)."""
-        dt, gaits = self._timestep, self.gaits
-        self._stance_time = np.array([gait.stance.duration for gait in gaits])
-        self._flight_time = np.array([gait.flight.duration for gait in gaits])
-        self.stance_ticks = np.round(self._stance_time / dt).astype(np.intp)
-        self.flight_ticks = np.ceil(LATEST_TOUCHDOWN * self._flight_time / dt).astype(np.intp)
-        self._phase = _phases(self._stance_time, int(self.stance_ticks.max()), dt)
-        stance = [g.stance.joint_reference(s) for g, s in zip(gaits, self._phase, strict=True)]
-        self._stance = np.stack([reference for reference, _ in stance])
-        self._stance_rate = np.stack([rate for _, rate in stance])
-
-        phase = _phases(self._flight_time, int(self.flight_ticks.max()), dt)
-        flight = [g.flight.joint_reference(s) for g, s in zip(gaits, phase, strict=True)]
-        self._flight = np.stack([reference for reference, _ in flight])
-        # Past its planned end the flight holds the posture of touchdown.
-        moving = (phase < 1.0)[..., None]
-        self._flight_rate = np.where(moving, np.stack([rate for _, rate in flight]), 0.0)
-        share = [self.spec.regulator.profile(s) for s in phase]
-        self._turn = np.stack([value for value, _ in share])
-        self._turn_rate = np.stack([rate for _, rate in share]) / self._flight_time[:, None]
+            self._laws[0] = spec.law.along([lifted_model(robot, gait, settings) for gait in gaits])
+        self._stance = _Reference.of([gait.stance for gait in gaits], timestep, 1.0)
+        self._flight = _Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
+        self._turn, rate = spec.regulator.profile(self._flight.phase)
+        self._turn_rate = rate / self._flight.duration[:, None]
+        end = np.array([1.0])
         self._lift_off_speed = np.array(
-            [gait.stance.base_reference(np.array([1.0]))[1][0, 0] for gait in gaits]
+            [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
         )
 
     @property
     def max_ticks(self) -> int:
         """Length of the longest tape."""
-        return int(max(self.stance_ticks.max(), self.flight_ticks.max()))
+        return int(max(self._stance.ticks.max(), self._flight.ticks.max()))
 
-    def stand(self) -> Tape:
-        """One tick of the start-up: every robot holds the posture in which its stance begins."""
-        position = self._stance[:, :1]
+    def stand(self, ticks: int = 1) -> Tape:
+        """The start-up: every robot holds the posture in which its stance begins."""
+        n = len(self.gaits)
+        position = np.repeat(self._stance.position[:, :1], ticks, axis=1)
         zero = np.zeros_like(position)
-        return Tape(zero, position, zero, np.ones(len(position), dtype=np.intp))
+        return Tape(zero, position, zero, np.full(n, ticks, dtype=np.intp))
 
-    def touchdown(self, rows: IntArray, duration: Array, upright: BoolArray | None = None) -> Tape:
-        """Stance tapes for robots that have just touched down; learns from their last stride.
+    def touchdown(self, rows: IntArray, learning: BoolArray | None = None) -> Tape:
+        """Stance tapes for robots that have just touched down.
 
         Args:
             rows: Which robots.
-            duration: How long their strides lasted [s], shape (len(rows),).
-            upright: Whether they have not fallen, shape (len(rows),); all by default.
+            learning: Whether they learn from their last stride first, shape (len(rows),); by
+                default none does.
         """
-        self._judge(rows, duration, upright)
-        if self.learning and self._law is not None:
-            self._learn(self._law, rows)
+        if learning is not None:
+            self._learn(rows[learning & (self.skipped[rows] == 0)])
+        reference, position = self._stance, self._stance.position[rows]
         return Tape(
-            feedforward=resample(self.feedforward[rows], self._phase[rows] * (SAMPLES - 1)),
-            position=self._stance[rows],
-            velocity=self._stance_rate[rows],
-            length=self.stance_ticks[rows],
+            feedforward=self._played(0, rows),
+            position=position,
+            velocity=reference.velocity[rows],
+            length=reference.ticks[rows],
             begin=self.spec.touchdown_ticks,
         )
 
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
         """Flight tapes for robots that have just finished a stance, and the stance's record."""
-        record = self._record(rows, log)
-        self._last.put(rows, record)
+        record = self._record(0, rows, log)
         speed = self._estimator.update(rows, log)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         share, rate = self._turn[rows] * turn, self._turn_rate[rows] * turn  # (m, ticks)
-        position = rotate_leg(self.robot, self._flight[rows], share[..., None])
-        velocity = self._flight_rate[rows].copy()
+        reference = self._flight
+        position = rotate_leg(self.robot, reference.position[rows], share[..., None])
+        velocity = reference.velocity[rows]
         velocity[..., 1::3] += rate[..., None]
-        tape = Tape(np.zeros_like(position), position, velocity, self.flight_ticks[rows])
+        tape = Tape(self._played(1, rows), position, velocity, reference.ticks[rows])
         return tape, record
 
-    def _record(self, rows: IntArray, log: PhaseLog) -> StrideRecord:
-        """The stance on the phase grid, aligned on t / T of the reference."""
-        index = log.index(phase_grid(), self._stance_time[rows] / self._timestep)
-        ticks = slice(self._stance.shape[1])
-        error = self._stance[rows] - log.joints[:, ticks]
-        rate = self._stance_rate[rows] - log.joint_rates[:, ticks]
-        return StrideRecord(
+    def landing(
+        self, rows: IntArray, log: PhaseLog, duration: Array, upright: BoolArray | None = None
+    ) -> StrideRecord:
+        """The end of a stride: the flight's record; whether the stride is worth learning from.
+
+        Args:
+            rows: Which robots.
+            log: What was measured in flight.
+            duration: How long their strides lasted [s], shape (len(rows),).
+            upright: Whether they have not fallen, shape (len(rows),); all by default.
+        """
+        record = self._record(1, rows, log)
+        relative = duration / (self._stance.duration[rows] + self._flight.duration[rows])
+        reasons = []
+        for last in self._last:
+            last.relative_duration[rows] = relative
+            last.upright[rows] = True if upright is None else upright
+            reasons.append(self.spec.selection.skipped(last.take(rows)))
+        self.skipped[rows] = np.where(reasons[0] > 0, reasons[0], reasons[1])
+        return record
+
+    def _played(self, part: int, rows: IntArray) -> Array:
+        """The feedforward at the ticks of a part, shape (m, ticks, 12)."""
+        phase = (self._stance, self._flight)[part].phase[rows]
+        return resample(self.feedforward[rows, part], phase * (SAMPLES - 1))
+
+    def _record(self, part: int, rows: IntArray, log: PhaseLog) -> StrideRecord:
+        """What was measured in a part of the stride, aligned on t / T of the reference."""
+        reference = (self._stance, self._flight)[part]
+        index = log.index(phase_grid(), reference.duration[rows] / self._timestep)
+        ticks = slice(min(reference.position.shape[1], log.joints.shape[1]))
+        error = reference.position[rows, ticks] - log.joints[:, ticks]
+        rate = reference.velocity[rows, ticks] - log.joint_rates[:, ticks]
+        record = StrideRecord(
             error=resample(error, index),
             error_rate=resample(rate, index),
             feedback=resample(log.feedback, index),
-            feedforward=self.feedforward[rows],
+            feedforward=self.feedforward[rows, part],
             missing=resample(log.missing, index),
             contact_error=np.abs(error[:, : log.felt]).max(axis=1, initial=0.0),
             relative_duration=np.full(len(rows), np.nan),
             upright=np.ones(len(rows), dtype=bool),
             robot=rows,
         )
+        self._last[part].put(rows, record)
+        return record
 
-    def _judge(self, rows: IntArray, duration: Array, upright: BoolArray | None) -> None:
-        """Complete the records of the last strides, and tell why some teach nothing."""
-        self._last.relative_duration[rows] = duration / (
-            self._stance_time[rows] + self._flight_time[rows]
-        )
-        self._last.upright[rows] = True if upright is None else upright
-        self.skipped[rows] = self.spec.selection.skipped(self._last.take(rows))
-
-    def _learn(self, law: LearningLaw, rows: IntArray) -> None:
-        """Update the feedforward of those robots whose last stride is worth learning from."""
-        rows = rows[self.skipped[rows] == 0]
+    def _learn(self, rows: IntArray) -> None:
+        """Update the feedforward of some robots from their last stride."""
         if rows.size:
-            record = self._last.take(rows)
-            learned = law.update(given(record))
-            self.feedforward[rows] = anti_windup(learned, record, self.robot.tau_max)
-
-
-def _phases(durations: Array, ticks: int, timestep: float) -> Array:
-    """Phase s at each tick, held at 1, shape (n, ticks)."""
-    return np.minimum(np.arange(ticks) * timestep / durations[:, None], 1.0)
+            for part, law in enumerate(self._laws):
+                if law is not None:
+                    record = self._last[part].take(rows)
+                    learned = law.update(given(record))
+                    self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)

@@ -16,17 +16,19 @@ from .record import SAMPLES
 def model_feedforward(
     robot: Robot, gaits: Sequence[Gait], *, samples: int = SAMPLES, friction: float = 0.6
 ) -> Array:
-    """Stance torques that the model asks for along each gait [N m], shape (n, samples, 12)."""
-    return np.stack(
-        [
-            feedforward(
-                robot,
-                gait,
-                samples=samples,
-                friction=friction,
-                contact="rolling",
-                guide=SAGITTAL_GUIDE,
-            ).stance
-            for gait in gaits
-        ]
-    )
+    """Torques that the model asks for in stance and flight of each gait [N m].
+
+    Shape (n, 2, samples, 12).
+    """
+    found = [
+        feedforward(
+            robot,
+            gait,
+            samples=samples,
+            friction=friction,
+            contact="rolling",
+            guide=SAGITTAL_GUIDE,
+        )
+        for gait in gaits
+    ]
+    return np.stack([[one.stance, one.flight] for one in found])

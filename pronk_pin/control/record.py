@@ -9,6 +9,9 @@ import numpy as np
 from .._typing import Array, BoolArray, IntArray
 from ..robot import NL
 
+PARTS = ("stance", "flight")
+"""Parts of a stride; arrays with an axis for them hold the stance first."""
+
 SAMPLES = 161
 """Samples of the phase grid s = 0 ... 1 on which strides are recorded and learned."""
 
@@ -51,10 +54,12 @@ class PhaseLog:
 
 @dataclass(frozen=True)
 class StrideRecord:
-    """The stance of n robots on the phase grid, from the touchdown's being felt on.
+    """One part of a stride of n robots on the phase grid: the stance, or the flight.
 
-    Arrays have the shape (n, samples, 12) where nothing else is said; before the touchdown was felt
-    they hold the first value after it.
+    A stance is recorded from the touchdown's being felt on, a flight until it is felt.
+
+    Arrays have the shape (n, samples, 12) where nothing else is said. Phases s = t / T are those of
+    the reference; what was not measured holds the nearest value that was.
 
     Attributes:
         error: Unmodified reference minus measured joint angle [rad]: eq. (8).

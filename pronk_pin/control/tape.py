@@ -1,7 +1,8 @@
 """Between two events everything is a tape: feedforward torque and reference at every tick.
 
 A controller writes a tape at each touchdown and lift-off; the simulation plays it:
-`tau = ff + kp (q_d - q) + kd (v_d - v)`, clipped to the motors' limits.
+`tau = ff + kp (q_d - q) + kd (v_d - v)`, clipped to the motors' limits. That is affine in q and v,
+so that servos can play a whole tape from its set points `ff + kp q_d + kd v_d` alone.
 """
 
 from __future__ import annotations
@@ -41,6 +42,17 @@ class Gains:
         """Derivative gains of all joints [N m s/rad], shape (12,)."""
         return np.tile(self.kd, NL // 3)
 
+    def feedback(self, error: Array, error_rate: Array) -> Array:
+        """Kp e + Kd e' [N m], eq. (9); 0 where a sensor failed, which must not reach the motors.
+
+        Args:
+            error: Reference minus measured joint angles [rad], shape (..., 12).
+            error_rate: Its time derivative [rad/s], shape (..., 12).
+        """
+        feedback = self.proportional * error + self.derivative * error_rate
+        feedback[~np.isfinite(feedback)] = 0.0
+        return feedback
+
 
 @dataclass(frozen=True)
 class Tape:
@@ -60,40 +72,13 @@ class Tape:
     length: IntArray
     begin: int = 0
 
+    def setpoint(self, gains: Gains) -> Array:
+        """What servos with these gains are told: the torque at q = v = 0 [N m], (n, ticks, 12)."""
+        return (
+            self.feedforward + gains.proportional * self.position + gains.derivative * self.velocity
+        )
 
-class Player:
-    """Plays one tape for each of n robots, each on its own clock.
 
-    Attributes:
-        tick: Tick at which each robot's tape is, shape (n,).
-        length: Length of each robot's tape, shape (n,).
-    """
-
-    def __init__(self, n: int, ticks: int, gains: Gains, tau_max: Array) -> None:
-        self._feedforward, self._position, self._velocity = np.zeros((3, n, ticks, NL))
-        self._kp, self._kd, self._tau_max = gains.proportional, gains.derivative, tau_max
-        self._rows = np.arange(n)
-        self.tick, self.length = np.zeros((2, n), dtype=np.intp)
-
-    def load(self, rows: IntArray, tape: Tape) -> None:
-        """Put a tape in for some robots, wound to where it begins."""
-        ticks = tape.position.shape[1]
-        self._feedforward[rows, :ticks] = tape.feedforward
-        self._position[rows, :ticks] = tape.position
-        self._velocity[rows, :ticks] = tape.velocity
-        self.length[rows], self.tick[rows] = tape.length, tape.begin
-
-    def play(self, joints: Array, joint_rates: Array) -> tuple[Array, Array, Array]:
-        """Torques at this tick: the sum within the limits, its feedback, its feedforward [N m].
-
-        Args:
-            joints: Joint angles [rad], shape (n, 12).
-            joint_rates: Joint velocities [rad/s], shape (n, 12).
-        """
-        at = (self._rows, self.tick)
-        feedback = self._kp * (self._position[at] - joints)
-        feedback += self._kd * (self._velocity[at] - joint_rates)
-        feedback[~np.isfinite(feedback)] = 0.0  # a sensor that fails must not reach the motors
-        feedforward = self._feedforward[at]
-        torque = np.clip(feedforward + feedback, -self._tau_max, self._tau_max)
-        return torque, feedback, feedforward
+def clip_torque(feedback: Array, feedforward: Array, tau_max: Array) -> Array:
+    """The torque that the motors are told: the sum, within their limits [N m]."""
+    return np.clip(feedforward + feedback, -tau_max, tau_max)

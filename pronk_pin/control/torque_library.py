@@ -13,12 +13,13 @@ from .record import resample
 
 @dataclass(frozen=True)
 class TorqueLibrary:
-    """Stance torques by speed, averaged over strides in steady state.
+    """Torques by speed, averaged over strides in steady state.
 
     Attributes:
         speeds: Increasing speeds [m/s], shape (n,).
-        torque: Mean feedforward on the phase grid [N m], shape (n, samples, 12).
-        spread: Its standard deviation over the strides [N m], shape (n, samples, 12).
+        torque: Mean feedforward on the phase grids of stance and flight [N m], shape
+            (n, 2, samples, 12).
+        spread: Its standard deviation over the strides [N m], of the same shape.
     """
 
     speeds: Array
@@ -33,11 +34,11 @@ class TorqueLibrary:
 
     @classmethod
     def from_strides(cls, speeds: Array, torque: Array) -> TorqueLibrary:
-        """Average over strides: `torque` has the shape (n, strides, samples, 12)."""
+        """Average over strides: `torque` has the shape (n, strides, 2, samples, 12)."""
         return cls(speeds, np.nanmean(torque, axis=1), np.nanstd(torque, axis=1))
 
     def at(self, speeds: Array) -> Array:
-        """Torques at given speeds (m,), interpolated between neighbours [N m], (m, samples, 12).
+        """Torques at given speeds (m,), interpolated between neighbours [N m], (m, 2, ...).
 
         Raises:
             SpeedOutOfRange: The library does not cover a speed.

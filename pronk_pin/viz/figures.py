@@ -88,7 +88,7 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
 
 def torque_library(strides: xr.Dataset) -> Figure:
     """Fig. 4 of the paper: the learned torque over the stance phase, by speed."""
-    torque = steady(strides)["feedforward"].mean("stride")
+    torque = steady(strides)["feedforward"].sel(part="stance").mean("stride")
     speeds = strides["speed"].to_numpy()
     figure = _figure(8.0, 3.4)
     axes = figure.subplots(1, 2)
@@ -169,8 +169,9 @@ def _learning(strides: xr.Dataset, joint: str, length: int = 27) -> Array | None
 
 def _joint_curves(strides: xr.Dataset, joint: str) -> tuple[Array, Array]:
     """Measured (strides, samples) and reference (samples,) angle of a joint in stance [rad]."""
-    planned = strides["reference"].sel(joint=joint).to_numpy()
-    return planned - strides["error"].sel(joint=joint).to_numpy(), planned
+    stance = strides[["reference", "error"]].sel(part="stance", joint=joint)
+    planned = stance["reference"].to_numpy()
+    return planned - stance["error"].to_numpy(), planned
 
 
 def _known(controllers: Iterable[str]) -> list[str]:

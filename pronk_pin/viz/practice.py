@@ -70,22 +70,24 @@ def _window(strides: xr.Dataset) -> xr.Dataset:
 
 
 def _clock(strides: xr.Dataset, k: int) -> tuple[Array, Array]:
-    """Times of the samples of stance and flight of a stride [s], each without its end."""
+    """Times of the samples of stance and flight of a stride [s], as far as each lasted."""
     one = strides.isel(stride=k)
     start, stance, duration = (float(one[name]) for name in ("start", "stance", "duration"))
-    phase = strides["phase"].to_numpy()[:-1]
-    return start + phase * stance, start + stance + phase * (duration - stance)
+    planned = strides["planned_duration"].to_numpy()
+    down, up = (one["phase"].to_numpy() * length for length in planned)
+    return start + down[down < stance], start + stance + up[up < duration - stance]
 
 
 def _measured(robot: Robot, strides: xr.Dataset, name: str) -> Track:
     """The robot as simulated."""
     times, base, joints = [], [], []
-    reference = strides["reference"].to_numpy()
+    measured = (strides["reference"] - strides["error"]).transpose("stride", "part", "phase", ...)
     for k in range(strides.sizes["stride"]):
-        one = strides.isel(stride=k)
-        times += [*_clock(strides, k)]
-        base += [one["base_stance"].to_numpy()[:-1], one["base_flight"].to_numpy()[:-1]]
-        joints += [(reference - one["error"].to_numpy())[:-1], one["flight"].to_numpy()[:-1]]
+        for part, clock in enumerate(_clock(strides, k)):
+            one = {"stride": k, "part": part, "phase": slice(len(clock))}
+            times.append(clock)
+            base.append(strides["base"].isel(one).to_numpy())
+            joints.append(measured.isel(one).to_numpy())
     return _track(robot, name, times, base, joints, ghost=False)
 
 
@@ -94,7 +96,7 @@ def _planned(robot: Robot, strides: xr.Dataset, gait: Gait) -> Track:
     times, base, joints = [], [], []
     for k in range(strides.sizes["stride"]):
         one = strides.isel(stride=k)
-        x = float(one["base_stance"][0, 0])
+        x = float(one["base"][0, 0, 0])
         for phase, clock in zip((gait.stance, gait.flight), _clock(strides, k), strict=True):
             begin = clock[0]
             s = np.minimum((clock - begin) / phase.duration, 1.0)

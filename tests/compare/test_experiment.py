@@ -122,17 +122,19 @@ def test_the_library_is_the_mean_of_what_was_learned_in_the_end(comparison: Resu
     strides = comparison.strides(comparison.find(controller="ilc"))
     library = torque_library(strides)
     np.testing.assert_allclose(library.speeds, comparison.experiment.speeds)
-    mean = steady(strides)["feedforward"].mean("stride").transpose("speed", "phase", "joint")
-    np.testing.assert_allclose(library.torque[:, ::2], mean, atol=1e-4)
-    between = 0.5 * (library.torque[:, :-1:2] + library.torque[:, 2::2])
-    np.testing.assert_allclose(library.torque[:, 1::2], between, atol=1e-4)
+    mean = (
+        steady(strides)["feedforward"].mean("stride").transpose("speed", "part", "phase", "joint")
+    )
+    np.testing.assert_allclose(library.torque[:, :, ::4], mean, atol=1e-4)
+    between = 0.5 * (library.torque[:, :, :-1:4] + library.torque[:, :, 4::4])
+    np.testing.assert_allclose(library.torque[:, :, 2::4], between, atol=1e-4)
 
 
 def test_the_library_repeats_what_was_learned(comparison: Results) -> None:
     replay = comparison.strides(comparison.find(controller="library"))
     learned = torque_library(comparison.strides(comparison.find(controller="ilc")))
-    played = replay["feedforward"].isel(stride=3).transpose("speed", "phase", "joint")
-    np.testing.assert_allclose(played, learned.torque[:, ::2], atol=1e-4)
+    played = replay["feedforward"].isel(stride=3).transpose("speed", "part", "phase", "joint")
+    np.testing.assert_allclose(played, learned.torque[:, :, ::4], atol=1e-4)
     pd = comparison.strides(comparison.find(controller="pd"))
     calf = [str(name) for name in pd["joint"].to_numpy() if str(name).endswith("calf")]
     peaks = [steady(run)["peak_error"].sel(joint=calf).mean() for run in (replay, pd)]

@@ -14,7 +14,7 @@ import pytest
 
 from pronk_pin.compare.scenario import Scenario
 from pronk_pin.compare.world import World
-from pronk_pin.control.tape import Gains, Player, Tape
+from pronk_pin.control.tape import Gains, Tape
 from pronk_pin.gait import Gait, GaitProblem, bezier, load_library, optimize_gait
 from pronk_pin.robot import Robot, load_robot
 
@@ -31,6 +31,13 @@ class Replay(NamedTuple):
     apex: np.ndarray
 
 
+class Played(NamedTuple):
+    """What became of one phase, each of shape (n,)."""
+
+    ticks: np.ndarray
+    top: np.ndarray
+
+
 def tapes(gaits: Sequence[Gait], name: str, dt: float) -> Tape:
     """A phase of the gaits tick by tick; after its end it stays where it ended."""
     length = max(round(1.3 * gait.phase(name).duration / dt) for gait in gaits)
@@ -45,45 +52,43 @@ def tapes(gaits: Sequence[Gait], name: str, dt: float) -> Tape:
     return Tape(torque, position, velocity, np.array(last))
 
 
-def part(tape: Tape, rows: np.ndarray) -> Tape:
-    return Tape(tape.feedforward[rows], tape.position[rows], tape.velocity[rows], tape.length[rows])
+def play(robot: Robot, world: World, tape: Tape, early: np.ndarray | None = None) -> Played:
+    """Play tapes to their ends, or from the ticks `early` on until the feet carry a load."""
+    n = world.n
+    motion = world.play(np.arange(n), tape.setpoint(Gains()))
+    ticks = tape.length
+    if early is not None:
+        loaded = motion.force[..., 2].sum(axis=-1) > 0.1 * robot.mass * robot.gravity
+        loaded &= np.arange(loaded.shape[1]) >= early[:, None]
+        assert loaded.any(axis=1).all()
+        ticks = 1 + np.argmax(loaded, axis=1)
+    world.advance(np.arange(n), motion, ticks)
+    height = motion.base[..., 1]
+    inside = np.arange(height.shape[1]) < ticks[:, None]
+    return Played(ticks, np.where(inside, height, 0.0).max(axis=1))
 
 
 def replay(robot: Robot, gaits: Sequence[Gait]) -> Replay:
-    """Average speed and mean apex over the last strides, from a start at the apex."""
+    """Average speed and mean apex over the last strides, from a start at lift-off."""
     n, dt = len(gaits), RIGID.timestep
-    world, everyone = World(robot, RIGID, n), np.arange(len(gaits))
+    world = World(robot, RIGID, n, servo=Gains())
     stance, flight = tapes(gaits, "stance", dt), tapes(gaits, "flight", dt)
-    ticks = max(tape.position.shape[1] for tape in (stance, flight))
-    player = Player(n, ticks, Gains(), robot.tau_max)
-    middle = np.array([0.5])
-    states = [(g.flight.base_reference(middle), g.flight.joint_reference(middle)) for g in gaits]
+    start = np.array([0.0])
+    states = [(g.flight.base_reference(start), g.flight.joint_reference(start)) for g in gaits]
     base, base_rate = (np.array([s[0][k][0, :2] for s in states]) for k in (0, 1))
     joints, rates = (np.array([s[1][k][0] for s in states]) for k in (0, 1))
     world.reset(base, joints, base_rate, rates)
-    player.load(everyone, flight)
-    player.tick[:] = [round(0.5 * gait.flight.duration / dt) for gait in gaits]
     early = np.array([0.7 * gait.flight.duration / dt for gait in gaits])
-    flying, top = np.ones(n, dtype=bool), np.zeros(n)
-    landings: list[list[tuple[float, float]]] = [[] for _ in gaits]
-    tops: list[list[float]] = [[] for _ in gaits]
-    for step in range(round((STRIDES + 1) * max(gait.duration for gait in gaits) / dt)):
-        torque, _, _ = player.play(world.joints, world.joint_rates)
-        world.step(torque)
-        player.tick += 1
-        top = np.where(flying, np.maximum(top, world.base[:, 1]), 0.0)
-        loaded = world.force[:, :, 2].sum(axis=1) > 0.1 * robot.mass * robot.gravity
-        landed = np.flatnonzero(flying & loaded & (player.tick > early))
-        left = np.flatnonzero(~flying & (player.tick >= player.length))
-        for i in landed:
-            landings[i].append((step * dt, world.base[i, 0]))
-            tops[i].append(top[i])
-        player.load(landed, part(stance, landed))
-        player.load(left, part(flight, left))
-        flying[landed], flying[left] = False, True
-    settled = [np.array(events[SETTLING:]) for events in landings]
-    speed = [(e[-1, 1] - e[0, 1]) / (e[-1, 0] - e[0, 0]) for e in settled]
-    return Replay(np.array(speed), np.array([np.mean(heights[SETTLING:]) for heights in tops]))
+    play(robot, world, flight, early)
+    tops, clock, landings = [], np.zeros(n), [(np.zeros(n), world.base[:, 0])]
+    for _ in range(STRIDES):
+        down = play(robot, world, stance)
+        up = play(robot, world, flight, early)
+        clock = clock + (down.ticks + up.ticks) * dt
+        landings.append((clock, world.base[:, 0]))
+        tops.append(up.top)
+    (begun, first), (ended, last) = landings[SETTLING], landings[-1]
+    return Replay((last - first) / (ended - begun), np.mean(tops[SETTLING:], axis=0))
 
 
 def check(robot: Robot, gaits: Sequence[Gait]) -> None:

@@ -20,6 +20,7 @@ from pronk_pin.compare.metrics import (
     settling_stride,
     strides_to_converge,
 )
+from pronk_pin.control import PARTS
 
 PRACTICE = 40
 NAMES = [f"{leg}_{joint}" for leg in ("FL", "FR", "RL", "RR") for joint in ("hip", "thigh", "calf")]
@@ -31,8 +32,9 @@ def made() -> Callable[..., xr.Dataset]:
         """Strides of one robot by the peak errors of its calves; other joints have less."""
         n = len(peak)
         errors = peak[None, :, None] * np.tile([0.1, 0.5, 1.0], 4)
-        torque = np.ones((1, n, 5, 12))
+        torque = np.ones((1, n, 1, 5, 12))
         stride, scalars = ("speed", "stride"), np.ones((1, n))
+        curve = (*stride, "part", "phase", "joint")
         learning = (np.arange(n) >= practice) & (controller == "ilc")
         return xr.Dataset(
             {
@@ -46,10 +48,10 @@ def made() -> Callable[..., xr.Dataset]:
                 "mean_speed": (stride, 0.25 * scalars),
                 "apex": (stride, 0.33 + 0.01 * (-1.0) ** np.arange(n)[None]),
                 "duration": (stride, 0.4 * scalars),
-                "feedback": ((*stride, "phase", "joint"), 3.0 * torque),
-                "feedforward": ((*stride, "phase", "joint"), torque),
+                "feedback": (curve, np.concatenate([3.0 * torque, 9.0 * torque], axis=2)),
+                "feedforward": (curve, np.concatenate([torque, torque], axis=2)),
             },
-            coords={"speed": [0.3], "stride": np.arange(n), "joint": NAMES},
+            coords={"speed": [0.3], "stride": np.arange(n), "part": list(PARTS), "joint": NAMES},
             attrs={
                 "robot": "a1",
                 "base": "locked",
@@ -216,7 +218,9 @@ def test_the_metrics_of_a_simulation_are_those_of_its_curves(comparison: Results
     cell = comparison.find(controller="pd")
     end = steady(comparison.strides(cell))
     calf = [name for name in NAMES if name.endswith("calf")]
-    peak = np.abs(end["error"]).sel(joint=calf).max("phase").mean(["stride", "joint"])
+    peak = (
+        np.abs(end["error"]).sel(part="stance", joint=calf).max("phase").mean(["stride", "joint"])
+    )
     summary = comparison.summary()
     rows = summary[(summary["controller"] == "pd") & (summary["joint"] == "calf")]
     stored = rows[rows["metric"] == "peak_error"].sort_values("speed")["value"]

@@ -100,7 +100,7 @@ def test_a_folder_that_holds_no_result_is_refused(tmp_path: Path) -> None:
         lambda config: json.dumps(config)[:-40],
         lambda config: "[1, 2]",
         lambda config: json.dumps({**config, "experiment": [1]}),
-        lambda config: json.dumps({"schema": 1}),
+        lambda config: json.dumps({"schema": 2}),
         lambda config: json.dumps({**config, "experiment": {**config["experiment"], "wind": 3}}),
         lambda config: json.dumps({**config, "experiment": {**config["experiment"], "speeds": []}}),
         lambda config: json.dumps({**config, "experiment": {**config["experiment"], "robot": "x"}}),
@@ -121,7 +121,7 @@ def test_a_folder_of_another_version_is_refused(copy: Results) -> None:
     path = copy.folder / "config.json"
     path.write_text(json.dumps({**copy.config, "schema": 99}))
     text = message(lambda: Results.load(copy.folder), path)
-    assert text == "schema 99, not 1; run 'pronk-pin compare' to make one"
+    assert text == "schema 99, not 2; run 'pronk-pin compare' to make one"
 
 
 @pytest.mark.parametrize("keep", [0, 100, 0.5], ids=["empty", "beginning only", "half"])

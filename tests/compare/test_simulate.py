@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pronk_pin._typing import Array
-from pronk_pin.compare import Results, Schedule, Simulation
-from pronk_pin.compare.record import StrideLog
+from pronk_pin._typing import Array, IntArray
+from pronk_pin.compare import Results, Schedule, Simulation, load_scenario
+from pronk_pin.compare.record import LAST, StrideLog
+from pronk_pin.compare.world import Motion
 from pronk_pin.control import SAMPLES, ControllerSpec, Gains, load_controller
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import Gait
+from pronk_pin.robot import Robot
 
 PD = load_controller("pd")
 
@@ -111,8 +113,8 @@ def test_limp_robots_fall_and_that_is_a_result(simulation: Callable[..., Simulat
 def test_a_robot_that_is_pulled_down_falls_and_the_other_does_not(
     simulation: Callable[..., Simulation],
 ) -> None:
-    feedforward = np.zeros((2, SAMPLES, 12))
-    feedforward[1, :, 1::3], feedforward[1, :, 2::3] = 200.0, -200.0  # folds the legs
+    feedforward = np.zeros((2, 2, SAMPLES, 12))
+    feedforward[1, 0, :, 1::3], feedforward[1, 0, :, 2::3] = 200.0, -200.0  # folds the legs
     pulled = simulation(PD, feedforward=feedforward)
     pulled.run()
     assert pulled.upright.tolist() == [True, False]
@@ -128,14 +130,14 @@ def test_a_robot_that_leaves_the_finite_numbers_is_reported_and_disturbs_nobody(
     monkeypatch.chdir(tmp_path)
     whole, struck = simulation(PD), simulation(PD)
     world, count = struck.world, iter(range(10_000))
-    step = world.step
+    play = world.play
 
-    def spoil(tau: Array) -> None:
-        if next(count) in (100, 900):  # while it stands, and while it pronks
-            world._state[1, 0, 1 + world.model.nq + world._qvel] = value
-        step(tau)
+    def spoil(rows: IntArray, control: Array) -> Motion:
+        if 1 in rows and next(count) in (0, 9):  # while it stands, and while it pronks
+            world._state[1, world._qvel] = value
+        return play(rows, control)
 
-    world.step = spoil  # type: ignore[method-assign]
+    world.play = spoil  # type: ignore[method-assign]
     log, reference = struck.run(), whole.run()
 
     assert struck.upright.tolist() == [True, False]
@@ -178,3 +180,45 @@ def test_without_start_up_and_practice_the_robots_learn_from_the_first_stride_on
     for learning in finished(log, "learning"):
         assert np.all(learning[1:] == 1.0)
     assert learner.controller.feedforward.any()
+
+
+@pytest.mark.parametrize("name", ["pd", "ilc"])
+def test_servos_and_feedback_tick_by_tick_give_the_same_motion_over_three_seconds(
+    robot: Robot, gaits: list[Gait], name: str
+) -> None:
+    """Compared at every tick of the last strides, with learning half of the time."""
+    logs = [
+        Simulation(
+            robot,
+            gaits,
+            load_controller(name),
+            load_scenario("nominal"),
+            schedule=Schedule(practice=1.5, learning=1.5),
+            rng=np.random.default_rng(0),
+            chunked=chunked,
+        ).run()
+        for chunked in (True, False)
+    ]
+    assert np.array_equal(logs[0].count, logs[1].count)
+    for one, other in zip(*(log.ticks().values() for log in logs), strict=True):
+        assert np.isfinite(one).any()
+        np.testing.assert_array_equal(np.isnan(one), np.isnan(other))
+    for quantity, tolerance in (("joints", 1e-6), ("base", 1e-6), ("joint_rates", 1e-4)):
+        np.testing.assert_allclose(*(log.ticks()[quantity] for log in logs), atol=tolerance)
+
+
+def test_the_ticks_kept_are_those_of_the_last_strides(pronking: StrideLog) -> None:
+    ticks = pronking.ticks()
+    kept = min(LAST, int(pronking.count.min()))
+    for k in range(2):
+        base, rate = (ticks[name][k, -kept:] for name in ("base", "base_rate"))
+        length = np.isfinite(base[..., 0]).sum(axis=-1)  # (strides, parts)
+        total = (length.sum(axis=1) * 0.001)[-3:]
+        np.testing.assert_allclose(total, finished(pronking, "duration")[k][-3:], atol=1e-9)
+        for stride in range(kept - 1):
+            end = length[stride, 1] - 1  # one tick before the next touchdown
+            step = base[stride, 1, end] + 0.001 * rate[stride + 1, 0, 0]
+            np.testing.assert_allclose(base[stride + 1, 0, 0], step, atol=1e-6)
+        force = ticks["force"][k, -kept:]
+        assert np.nanmax(np.abs(force[:, 1, 40:120])) == 0.0  # in the middle of flight
+        assert np.all(np.nanmedian(force[:, 0, 20:100, :, 2], axis=(0, 1)) > 20.0)  # feet stand

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from pronk_pin._typing import Array
+from pronk_pin._typing import Array, BoolArray
 from pronk_pin.control import (
     CONTROLLERS,
     SAMPLES,
@@ -14,6 +15,7 @@ from pronk_pin.control import (
     ControllerSpec,
     PDTypeILC,
     PhaseLog,
+    Tape,
     load_controller,
     phase_grid,
 )
@@ -24,11 +26,41 @@ from pronk_pin.robot import Robot
 
 DT = 0.001
 BOTH = np.arange(2)
+STANCE_LAW = PDTypeILC()
 
 
 @pytest.fixture
 def controller(robot: Robot, gaits: list[Gait]) -> Controller:
     return Controller(robot, gaits, load_controller("ilc"), timestep=DT)
+
+
+@pytest.fixture
+def flights(gaits: list[Gait], phase_log: Callable[..., PhaseLog]) -> PhaseLog:
+    """Logs of flights as planned."""
+    ticks = round(gaits[0].flight.duration / DT)
+    references = [g.flight.joint_reference(_phases(g.flight.duration, ticks)) for g in gaits]
+    return phase_log(*(np.stack(part) for part in zip(*references, strict=True)))
+
+
+@pytest.fixture
+def learn(gaits: list[Gait], flights: PhaseLog) -> Callable[..., Tape]:
+    """One stride with a measured stance, and the touchdown after it, with learning on."""
+
+    def stride(
+        controller: Controller,
+        stance: PhaseLog,
+        *,
+        duration: Array | None = None,
+        upright: BoolArray | None = None,
+        flight: PhaseLog = flights,
+        learning: BoolArray | None = None,
+    ) -> Tape:
+        planned = np.array([gait.duration for gait in gaits])
+        controller.liftoff(BOTH, stance)
+        controller.landing(BOTH, flight, planned if duration is None else duration, upright)
+        return controller.touchdown(BOTH, np.ones(2, dtype=bool) if learning is None else learning)
+
+    return stride
 
 
 @pytest.fixture
@@ -51,7 +83,7 @@ def _phases(duration: float, ticks: int) -> Array:
 def test_a_stance_tape_is_the_gaits_reference_at_each_tick(
     controller: Controller, gaits: list[Gait]
 ) -> None:
-    tape = controller.touchdown(BOTH, np.full(2, np.inf))
+    tape = controller.touchdown(BOTH)
     for robot, gait in enumerate(gaits):
         ticks = tape.length[robot]
         assert ticks * DT == pytest.approx(gait.stance.duration, abs=DT / 2)
@@ -61,18 +93,18 @@ def test_a_stance_tape_is_the_gaits_reference_at_each_tick(
 
 
 def test_a_stance_begins_as_late_as_the_touchdown_is_felt(controller: Controller) -> None:
-    assert controller.touchdown(BOTH, np.ones(2)).begin == controller.spec.touchdown_ticks == 2
+    assert controller.touchdown(BOTH).begin == controller.spec.touchdown_ticks == 2
 
 
 def test_a_stance_plays_the_feedforward_it_was_given(robot: Robot, gaits: list[Gait]) -> None:
-    slope = np.random.default_rng(0).normal(size=(2, 1, 12))
+    slope = np.random.default_rng(0).normal(size=(2, 2, 1, 12))
     feedforward = slope * phase_grid()[:, None]
     controller = Controller(
         robot, gaits, load_controller("library"), timestep=DT, feedforward=feedforward
     )
-    tape = controller.touchdown(np.array([1]), np.ones(1))
+    tape = controller.touchdown(np.array([1]))
     s = _phases(gaits[1].stance.duration, tape.feedforward.shape[1])
-    np.testing.assert_allclose(tape.feedforward[0], slope[1] * s[:, None], atol=1e-12)
+    np.testing.assert_allclose(tape.feedforward[0], slope[1, 0] * s[:, None], atol=1e-12)
 
 
 def test_flight_goes_on_from_stance_and_ends_in_the_posture_of_touchdown(
@@ -113,7 +145,7 @@ def test_speed_regulation_turns_the_legs_by_touchdown_and_nothing_else(
     np.testing.assert_allclose(tape.position[:, -1, 0::3], end[:, 0::3], atol=1e-12)
     np.testing.assert_allclose(tape.position[:, -1, 2::3], end[:, 2::3], atol=1e-12)
     again = Controller(robot, gaits, ControllerSpec("pd"), timestep=DT)
-    stance = again.touchdown(BOTH, np.ones(2)).position[:, 0]
+    stance = again.touchdown(BOTH).position[:, 0]
     unmodified = [gait.stance.joint_reference(np.array([0.0]))[0][0] for gait in gaits]
     np.testing.assert_allclose(stance, unmodified, atol=1e-12)
 
@@ -128,66 +160,100 @@ def test_the_record_holds_reference_minus_measured(
 
 
 def test_a_stride_as_planned_is_learned_from(
-    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+    controller: Controller, stances: Callable[..., PhaseLog], learn: Callable[..., Tape]
 ) -> None:
-    controller.learning = True
     _, record = controller.liftoff(BOTH, stances(0.1))
-    tape = controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
-    np.testing.assert_allclose(controller.feedforward, PDTypeILC().update(record))
+    tape = learn(controller, stances(0.1))
+    np.testing.assert_allclose(controller.feedforward[:, 0], STANCE_LAW.update(record))
     # 0.1 rad too little everywhere asks for half of Kp * 0.1.
     np.testing.assert_allclose(tape.feedforward[:, 80], 0.05 * np.tile([35, 60, 90], (2, 4)))
 
 
-def test_nothing_is_learned_from_strides_that_are_too_short_or_too_long(
-    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+def test_the_flight_is_learned_by_a_law_of_its_own(
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    flights: PhaseLog,
+    learn: Callable[..., Tape],
 ) -> None:
-    controller.learning = True
-    controller.liftoff(BOTH, stances(0.1))
-    controller.touchdown(BOTH, np.array([0.5, 1.5]) * gaits[0].duration)
+    spec = ControllerSpec("mine", flight_law=PDTypeILC(gain=0.3, leak=0.0))
+    controller = Controller(robot, gaits, spec, timestep=DT)
+    learn(controller, stances(), flight=replace(flights, joints=flights.joints - 0.1))
+    assert not controller.feedforward[:, 0].any()
+    expected = 0.03 * np.tile([35.0, 60.0, 90.0], (2, SAMPLES, 4))
+    np.testing.assert_allclose(controller.feedforward[:, 1], expected, atol=1e-9)
+    tape, _ = controller.liftoff(BOTH, stances())
+    np.testing.assert_allclose(tape.feedforward - expected[:, :1], 0.0, atol=1e-9)
+
+
+def test_a_flight_that_ends_early_is_learned_as_if_its_end_had_gone_on(
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    flights: PhaseLog,
+    learn: Callable[..., Tape],
+) -> None:
+    short = replace(flights, joints=flights.joints - 0.1, length=flights.length - 20)
+    short.joints[:, -20:] = 99.0  # what lies behind the end must not be read
+    spec = ControllerSpec("mine", flight_law=PDTypeILC(gain=1.0, leak=0.0))
+    controller = Controller(robot, gaits, spec, timestep=DT)
+    learn(controller, stances(), flight=short)
+    expected = 0.1 * np.tile([35.0, 60.0, 90.0], (2, SAMPLES, 4))
+    np.testing.assert_allclose(controller.feedforward[:, 1], expected, atol=1e-9)
+
+
+def test_nothing_is_learned_from_strides_that_are_too_short_or_too_long(
+    controller: Controller,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    learn: Callable[..., Tape],
+) -> None:
+    learn(controller, stances(0.1), duration=np.array([0.5, 1.5]) * gaits[0].duration)
     np.testing.assert_array_equal(controller.feedforward, 0.0)
 
 
-def test_each_robot_learns_from_its_own_strides_only(
-    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+def test_each_robot_learns_when_it_is_told_to(
+    controller: Controller, stances: Callable[..., PhaseLog], learn: Callable[..., Tape]
 ) -> None:
-    controller.learning = True
-    controller.liftoff(BOTH, stances(0.1))
-    controller.touchdown(np.array([1]), np.array([gaits[1].duration]))
+    learn(controller, stances(0.1), learning=np.array([False, True]))
     assert np.all(controller.feedforward[0] == 0.0)
-    assert np.all(controller.feedforward[1] > 0.0)
+    assert np.all(controller.feedforward[1, 0] > 0.0)
 
 
 def test_what_a_robot_begins_with_is_not_forgotten_before_the_first_stride(
     robot: Robot, gaits: list[Gait]
 ) -> None:
-    given = np.ones((2, SAMPLES, 12))
+    given = np.ones((2, 2, SAMPLES, 12))
     spec = load_controller("model+ilc")
     controller = Controller(robot, gaits, spec, timestep=DT, feedforward=given)
-    controller.learning = True
-    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    controller.touchdown(BOTH, np.ones(2, dtype=bool))
     np.testing.assert_array_equal(controller.feedforward, given)
 
 
 @pytest.mark.parametrize(("name", "learning"), [("ilc", False), ("pd", True), ("library", True)])
 def test_nothing_is_learned_without_a_law_or_with_the_law_off(
-    robot: Robot, gaits: list[Gait], stances: Callable[..., PhaseLog], name: str, learning: bool
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    learn: Callable[..., Tape],
+    name: str,
+    learning: bool,
 ) -> None:
     controller = Controller(robot, gaits, load_controller(name), timestep=DT)
-    controller.learning = learning
-    controller.liftoff(BOTH, stances(0.1))
-    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    learn(controller, stances(0.1), learning=np.full(2, learning))
     np.testing.assert_array_equal(controller.feedforward, 0.0)
 
 
 def test_what_was_handed_in_is_not_changed_by_learning(
-    robot: Robot, gaits: list[Gait], stances: Callable[..., PhaseLog]
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    learn: Callable[..., Tape],
 ) -> None:
-    given = np.zeros((2, SAMPLES, 12))
+    given = np.zeros((2, 2, SAMPLES, 12))
     spec = load_controller("model+ilc")
     controller = Controller(robot, gaits, spec, timestep=DT, feedforward=given)
-    controller.learning = True
-    controller.liftoff(BOTH, stances(0.1))
-    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
+    learn(controller, stances(0.1))
     assert np.any(controller.feedforward != 0.0)
     assert np.all(given == 0.0)
 
@@ -203,9 +269,11 @@ def test_standing_holds_the_posture_in_which_stance_begins(
 
 
 def test_a_feedforward_of_the_wrong_shape_is_refused(robot: Robot, gaits: list[Gait]) -> None:
-    with pytest.raises(InvalidInput, match=r"feedforward of shape \(1, 161, 12\); expected \(2,"):
+    with pytest.raises(
+        InvalidInput, match=r"feedforward of shape \(2, 161, 12\); expected \(2, 2,"
+    ):
         Controller(
-            robot, gaits, ControllerSpec("pd"), timestep=DT, feedforward=np.zeros((1, SAMPLES, 12))
+            robot, gaits, ControllerSpec("pd"), timestep=DT, feedforward=np.zeros((2, SAMPLES, 12))
         )
 
 
@@ -238,28 +306,32 @@ def test_what_happens_before_the_touchdown_is_felt_counts_as_contact_error_only(
 
 
 def test_a_motor_at_its_limit_does_not_wind_the_memory_up(
-    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+    controller: Controller, stances: Callable[..., PhaseLog], learn: Callable[..., Tape]
 ) -> None:
-    controller.learning = True
     log = stances(0.1)
     log.feedback[0, :, 2], log.missing[0, :, 2] = (
         9.0,
         -5.0,
     )  # the calf asked for more than its motor gave
-    controller.liftoff(BOTH, log)
-    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]))
-    np.testing.assert_array_equal(controller.feedforward[0, :, 2], 0.0)
-    assert np.all(controller.feedforward[0, :, 1] > 0.0)
-    assert np.all(controller.feedforward[1] > 0.0)
+    learn(controller, log)
+    stance = controller.feedforward[:, 0]
+    np.testing.assert_array_equal(stance[0, :, 2], 0.0)
+    assert np.all(stance[0, :, 1] > 0.0)
+    assert np.all(stance[1] > 0.0)
 
 
 def test_the_reason_why_a_stride_teaches_nothing_is_told(
-    controller: Controller, gaits: list[Gait], stances: Callable[..., PhaseLog]
+    controller: Controller,
+    stances: Callable[..., PhaseLog],
+    flights: PhaseLog,
+    learn: Callable[..., Tape],
 ) -> None:
-    controller.learning = True
+    assert SKIPPED[controller.skipped[0]] == "duration unknown"
     log = stances(0.1)
     log.joints[0, 50, 4] = np.nan  # a sensor failed
-    controller.liftoff(BOTH, log)
-    controller.touchdown(BOTH, np.array([gait.duration for gait in gaits]), np.array([True, False]))
+    learn(controller, log, upright=np.array([True, False]))
     assert [SKIPPED[code] for code in controller.skipped] == ["not finite", "fallen"]
+    flights.joint_rates[1, 30, 7] = np.inf
+    learn(controller, stances(0.1), upright=np.array([False, True]))
+    assert [SKIPPED[code] for code in controller.skipped] == ["fallen", "not finite"]
     np.testing.assert_array_equal(controller.feedforward, 0.0)

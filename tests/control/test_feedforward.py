@@ -18,7 +18,7 @@ def torque(robot: Robot, gaits: list[Gait]) -> Array:
 
 
 def test_the_models_torques_are_within_the_motors_limits(robot: Robot, torque: Array) -> None:
-    assert torque.shape == (2, SAMPLES, 12)
+    assert torque.shape == (2, 2, SAMPLES, 12)
     assert np.all(np.abs(torque) < robot.tau_max)
 
 
@@ -26,7 +26,7 @@ def test_a_denser_grid_holds_the_same_torques(
     robot: Robot, gaits: list[Gait], torque: Array
 ) -> None:
     coarse = model_feedforward(robot, gaits, samples=(SAMPLES - 1) // 2 + 1)
-    np.testing.assert_allclose(coarse, torque[:, ::2], atol=1e-5)
+    np.testing.assert_allclose(coarse, torque[:, :, ::2], atol=1e-5)
 
 
 def test_where_the_model_is_right_its_torques_replace_the_feedback(

@@ -11,7 +11,7 @@ SPEEDS = np.array([-0.1, 0.0, 0.3])
 
 @pytest.fixture
 def learned() -> TorqueLibrary:
-    torque = np.random.default_rng(0).normal(size=(3, SAMPLES, 12))
+    torque = np.random.default_rng(0).normal(size=(3, 2, SAMPLES, 12))
     return TorqueLibrary(SPEEDS, torque, np.zeros_like(torque))
 
 
@@ -31,21 +31,21 @@ def test_a_speed_that_was_not_practised_is_refused(learned: TorqueLibrary) -> No
 
 
 def test_strides_are_averaged_and_missing_ones_left_out() -> None:
-    torque = np.zeros((2, 3, SAMPLES, 12))
+    torque = np.zeros((2, 3, 2, SAMPLES, 12))
     torque[:, 0], torque[:, 1], torque[:, 2] = 1.0, 3.0, 5.0
     torque[1, 2] = np.nan
     library = TorqueLibrary.from_strides(np.array([0.0, 0.1]), torque)
-    np.testing.assert_allclose(library.torque[:, 0, 0], [3.0, 2.0])
-    np.testing.assert_allclose(library.spread[:, 0, 0], [np.std([1.0, 3.0, 5.0]), 1.0])
+    np.testing.assert_allclose(library.torque[:, 1, 0, 0], [3.0, 2.0])
+    np.testing.assert_allclose(library.spread[:, 1, 0, 0], [np.std([1.0, 3.0, 5.0]), 1.0])
 
 
 def test_speeds_must_increase() -> None:
-    torque = np.zeros((2, SAMPLES, 12))
+    torque = np.zeros((2, 2, SAMPLES, 12))
     with pytest.raises(InvalidInput, match="must increase"):
         TorqueLibrary(np.array([0.1, 0.1]), torque, torque)
 
 
 def test_every_speed_needs_a_torque() -> None:
-    torque = np.zeros((2, SAMPLES, 12))
+    torque = np.zeros((2, 2, SAMPLES, 12))
     with pytest.raises(InvalidInput, match="one torque and one spread for each speed"):
         TorqueLibrary(SPEEDS, torque, torque)
