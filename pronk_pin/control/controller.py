@@ -23,7 +23,6 @@ from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
-    ModelBasedILC,
     PaperILC,
     PDTypeILC,
     StrideSelection,
@@ -31,6 +30,7 @@ from .learning import (
     given,
 )
 from .linearise import Settings, lifted_model
+from .model_based import ModelBasedILC, NormOptimalILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
@@ -91,6 +91,7 @@ CONTROLLERS = {
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
@@ -176,6 +177,10 @@ class Controller:
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
         self._laws = list(spec.laws)
+        for law in self._laws:
+            learning_filter = getattr(law, "filter", None)
+            if isinstance(learning_filter, ZeroPhaseFilter):
+                learning_filter.warn()
         if isinstance(spec.law, ModelBasedILC):
             settings = Settings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep

@@ -45,7 +45,7 @@ class Settings(NamedTuple):
 
     `share` is the part of the gait's torque that acts as feedforward on the orbit: 0 before
     learning, and about 1 after it. How long the feet stay on the ground past the planned
-    lift-off changes in between, and with it the answers; 0.3 predicts whole learnings best.
+    lift-off changes in between, and with it the answers; 0.6 predicts whole learnings best.
     """
 
     gains: Gains = Gains()
@@ -53,7 +53,7 @@ class Settings(NamedTuple):
     speed_filter: float = 0.02
     touchdown_ticks: int = 2
     timestep: float = 0.001
-    share: float = 0.3
+    share: float = 0.6
 
 
 class _Phase(NamedTuple):
