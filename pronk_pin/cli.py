@@ -1,11 +1,12 @@
-"""The command line: `pronk-pin compare | gaits | view | report | parity`."""
+"""The command line: `pronk-pin compare | gaits | ilc | view | report | parity`."""
 
 from __future__ import annotations
 
 import sys
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated, Protocol, TextIO
 
 import numpy as np
 import tyro
@@ -13,8 +14,12 @@ from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from ._urdf import mujoco_spec
 from .compare import Experiment, Results, default_folder, run_experiment
+from .compare.gains import describe_gains, sweep_gains
+from .compare.prediction import compare_prediction, describe_prediction, practise
+from .compare.scenario import load_scenario
 from .compare.tables import format_tables
-from .errors import InvalidInput, PronkError
+from .control import load_controller
+from .errors import InvalidInput, LeakyFilter, PronkError
 from .gait import (
     GaitLibrary,
     build_library,
@@ -28,6 +33,7 @@ from .parity import compare_models
 from .robot import load_robot
 from .viz import Scene, gait_scene, serve, write_replay
 from .viz.gait_figures import write_gait_figures
+from .viz.learning_figures import write_prediction
 from .viz.practice import practice_scene
 from .viz.report import write_figures, write_report
 
@@ -241,6 +247,79 @@ class Gaits:
 
 
 @dataclass(frozen=True)
+class Analyze:
+    """Say what a learning law will do along a gait, and lay what it did beside it.
+
+    Prints stability, transient growth, what is left of the error, and robustness, all from the
+    lifted model; then the predicted error of each stride beside the measured one.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller whose law of the stance is analysed."""
+    speed: tuple[float, ...] = (0.0,)
+    """Speeds [m/s]."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    result: Path | None = None
+    """Results folder with a practice; by default a short one is simulated."""
+    strides: int = 20
+    """Strides of learning to compare."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("analysis.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        if self.strides < 1:
+            raise InvalidInput(f"strides={self.strides}; give 1 or more")
+        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        if self.result is None:
+            made = practise(spec, self.speed, scenario, robot=self.robot, strides=self.strides)
+        else:
+            results = Results.load(self.result)
+            made = results.strides(results.find(controller=self.controller, scenario=self.scenario))
+        predictions = []
+        for speed in self.speed:
+            predictions.append(compare_prediction(spec, made, speed, scenario, number=self.strides))
+            print(describe_prediction(predictions[-1]), end="\n\n")
+        print(f"figure  {write_prediction(predictions, self.figure)}")
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Tell whether learning permits smaller feedback gains, as the paper claims.
+
+    Practises once, then replays what was learned with smaller gains, beside the same gains alone.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller that practises."""
+    speed: tuple[float, ...] = (-0.4, 0.0, 0.4, 0.8)
+    """Speeds [m/s]."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    robot: str = "a1"
+    """Robot."""
+
+    def run(self) -> None:
+        """Do it."""
+        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        print(describe_gains(sweep_gains(spec, self.speed, scenario, robot=self.robot)))
+
+
+@dataclass(frozen=True)
+class Ilc:
+    """Analyse learning laws, and what learning is good for."""
+
+    action: Annotated[Analyze, subcommand("analyze")] | Annotated[Gains, subcommand("gains")]
+
+    def run(self) -> None:
+        """Do it."""
+        self.action.run()
+
+
+@dataclass(frozen=True)
 class Parity:
     """Tell whether an MJCF or a URDF is the same robot as ours; exit with 1 where it is not.
 
@@ -288,6 +367,7 @@ class _Runs(Protocol):
 Command = (
     Annotated[Compare, subcommand("compare")]
     | Annotated[Gaits, subcommand("gaits")]
+    | Annotated[Ilc, subcommand("ilc")]
     | Annotated[View, subcommand("view")]
     | Annotated[Report, subcommand("report")]
     | Annotated[Parity, subcommand("parity")]
@@ -305,13 +385,28 @@ def main(arguments: list[str] | None = None) -> int:
             args=arguments,
             config=(OmitSubcommandPrefixes,),
         )
-        return command.run() or 0
+        with warnings.catch_warnings():
+            warnings.simplefilter("once", LeakyFilter)
+            warnings.showwarning = _show_warning
+            return command.run() or 0
     except PronkError as error:
         print(f"pronk-pin: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("pronk-pin: interrupted", file=sys.stderr)
         return 130
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """A warning in one line, as errors are shown."""
+    print(f"pronk-pin: warning: {message}", file=sys.stderr)
 
 
 def _write_pages(results: Results) -> None:

@@ -39,7 +39,7 @@ class Answers(NamedTuple):
         """The answers of a model; `splines=None` takes every sample as it is."""
         samples, joints = model.shape
         curves = np.eye(samples) if splines is None else spline_basis(samples, splines)
-        basis = np.kron(curves, np.eye(joints))
+        basis = np.asarray(np.kron(curves, np.eye(joints)), dtype=float)
         state = np.zeros((len(model.carry), basis.shape[1]))
         own, pushed, answers = model.angle @ basis, model.push @ basis, []
         for _ in range(horizon):
