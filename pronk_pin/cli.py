@@ -18,6 +18,7 @@ from .compare.gains import describe_gains, sweep_gains
 from .compare.prediction import compare_prediction, describe_prediction, practise
 from .compare.scenario import load_scenario
 from .compare.tables import format_tables
+from .compare.transfer import describe_transfers, measure_transfers
 from .control import load_controller
 from .errors import InvalidInput, LeakyFilter, PronkError
 from .gait import (
@@ -309,10 +310,45 @@ class Gains:
 
 
 @dataclass(frozen=True)
+class Transfer:
+    """Tell where a stored skill may be reused, and where it has to be practised again.
+
+    Learns at home, replays the torque library at home, at speeds that were left out, and in other
+    worlds, and compares with practice there.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller that practises."""
+    speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+    """Speeds [m/s], increasing."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    worlds: tuple[str, ...] = ("payload", "weak-motors", "soft-ground")
+    """Worlds in which the skill is tried."""
+    robot: str = "a1"
+    """Robot."""
+
+    def run(self) -> None:
+        """Do it."""
+        table = measure_transfers(
+            load_controller(self.controller),
+            self.speed,
+            load_scenario(self.scenario),
+            [load_scenario(name) for name in self.worlds],
+            robot=self.robot,
+        )
+        print(describe_transfers(table))
+
+
+@dataclass(frozen=True)
 class Ilc:
     """Analyse learning laws, and what learning is good for."""
 
-    action: Annotated[Analyze, subcommand("analyze")] | Annotated[Gains, subcommand("gains")]
+    action: (
+        Annotated[Analyze, subcommand("analyze")]
+        | Annotated[Gains, subcommand("gains")]
+        | Annotated[Transfer, subcommand("transfer")]
+    )
 
     def run(self) -> None:
         """Do it."""

@@ -48,7 +48,7 @@ def sweep_gains(
         raise InvalidInput(f"controller '{spec.name}' does not learn; choose one that does")
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
-    practice = _simulate(machine, gaits, spec, scenario, Schedule(0.5, _PRACTICE, _LEARNING))
+    practice = simulate(machine, gaits, spec, scenario, Schedule(0.5, _PRACTICE, _LEARNING))
     learned = practice.controller.feedforward
     rows = []
     for share in shares:
@@ -56,8 +56,8 @@ def sweep_gains(
             gains = Gains(_scaled(spec.gains.kp, share), _scaled(spec.gains.kd, share))
             replay = replace(spec, law=None, flight_law=None, gains=gains)
             schedule = Schedule(0.5, _REPLAY, 0.0)
-            done = _simulate(machine, gaits, replay, scenario, schedule, feedforward)
-            rows.append({"share": share, "learned": feedforward is not None, **_judged(done)})
+            done = simulate(machine, gaits, replay, scenario, schedule, feedforward)
+            rows.append({"share": share, "learned": feedforward is not None, **judged(done)})
     return pd.DataFrame(rows)
 
 
@@ -96,7 +96,7 @@ def _answer(table: pd.DataFrame) -> str:
     )
 
 
-def _simulate(
+def simulate(
     robot: Robot,
     gaits: Sequence[Gait],
     spec: ControllerSpec,
@@ -104,6 +104,7 @@ def _simulate(
     schedule: Schedule,
     feedforward: Array | None = None,
 ) -> Simulation:
+    """A simulation of a controller that has been run, with one seed."""
     simulation = Simulation(
         robot,
         gaits,
@@ -117,7 +118,7 @@ def _simulate(
     return simulation
 
 
-def _judged(simulation: Simulation) -> dict[str, float | int]:
+def judged(simulation: Simulation) -> dict[str, float | int]:
     """Mean peaks over the robots' last strides, and how many robots stayed up."""
     log = simulation.strides
     steady = [
