@@ -282,7 +282,7 @@ def test_an_unknown_controller_is_refused_with_the_known_ones() -> None:
         load_controller("lqr")
     assert str(caught.value) == (
         "unknown controller 'lqr'; choose one of: pd, ilc, model, library, model+ilc, ilc-paper, "
-        "ilc-paper-exact, ilc-current"
+        "ilc-paper-exact, ilc-current, ilc-norm-optimal"
     )
 
 
