@@ -116,6 +116,7 @@ def compare_prediction(
     error = mine["error"].to_numpy()[first - 1 : min(made, first + number)]
     begin = _record(mine.isel(stride=first - 1), model)
     predicted = predict(law, model, begin, len(error) - 1)
+    predicted = predicted[:, :: (predicted.shape[1] - 1) // (error.shape[1] - 1)]
     return Prediction(
         spec.name, speed, analyze(law, model, begin), _by_joint(predicted), _by_joint(error)
     )

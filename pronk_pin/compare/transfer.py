@@ -9,18 +9,20 @@ import numpy as np
 import pandas as pd
 
 from .._typing import Array
-from ..control import ControllerSpec, TorqueLibrary
+from ..control import ControllerSpec
 from ..errors import InvalidInput
 from ..gait import load_library
 from ..robot import load_robot
+from .experiment import torque_library
 from .gains import judged, simulate
 from .scenario import Scenario
 from .simulate import Schedule
+from .strides import to_dataset
 
 TOLERANCE = 0.25
 """By how much a reused skill's error may exceed that where it was learned."""
 _PRACTICE = Schedule(0.5, 4.0, 16.0)
-_REPLAY = Schedule(0.5, 10.0, 0.0)
+_REPLAY = Schedule(0.5, 16.0, 0.0)  # the strides that count begin after the start
 
 
 def may_be_reused(replayed: Array, learned: Array, *, tolerance: float = TOLERANCE) -> bool:
@@ -63,8 +65,9 @@ def measure_transfers(
     gaits = [library.at(speed) for speed in speeds]
     frozen = replace(spec, law=None, flight_law=None)
     practice = simulate(machine, gaits, spec, home, _PRACTICE)
-    skill = practice.controller.feedforward
-    stored = TorqueLibrary(np.array(speeds), skill, np.zeros_like(skill))
+    strides = to_dataset(practice.strides, machine, gaits, attributes={"robot": robot})
+    stored = torque_library(strides)  # the mean of the last strides, as the controller replays
+    skill = stored.torque
     inner = np.array(speeds)[1:-1]
     left_out = np.concatenate([stored.without(v).at(np.array([v])) for v in inner])
     at_home = simulate(machine, gaits, frozen, home, _REPLAY, skill)

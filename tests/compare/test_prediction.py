@@ -24,7 +24,7 @@ def test_the_pd_type_laws_errors_are_predicted_within_a_factor_of_1_5(speed: flo
     strides = practise(spec, [speed], NOMINAL, robot="a1", strides=20)
     found = compare_prediction(spec, strides, speed, NOMINAL, number=20)
     assert len(found.factor) == 21
-    assert found.factor[0] == pytest.approx(1.0, abs=1e-6)
+    assert found.factor[0] == pytest.approx(1.0, abs=1e-5)
     assert found.factor.max() < 1.5
     assert f"worst factor {found.factor.max():.2f}" in describe_prediction(found)
 
