@@ -200,3 +200,7 @@ class PortUnavailable(PronkError):
             f"{tried} of {host} cannot be used ({reason}); choose another with --port, "
             "or leave it out to get a free one"
         )
+
+
+class LeakyFilter(UserWarning):
+    """A learning filter whose DC gain is not 1: it loses, or adds, torque in each stride."""

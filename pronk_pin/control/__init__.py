@@ -7,16 +7,14 @@ from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
-    ModelBasedILC,
-    NormOptimalILC,
     PaperILC,
     PDTypeILC,
-    PlantInversionILC,
     StrideSelection,
     anti_windup,
 )
 from .lifted import LiftedModel
 from .linearise import Settings, lifted_model
+from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape, clip_torque

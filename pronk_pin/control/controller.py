@@ -24,7 +24,6 @@ from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
-    ModelBasedILC,
     PaperILC,
     PDTypeILC,
     StrideSelection,
@@ -32,6 +31,7 @@ from .learning import (
     given,
 )
 from .linearise import Settings, lifted_model
+from .model_based import ModelBasedILC, NormOptimalILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
@@ -113,6 +113,7 @@ CONTROLLERS = {
         ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
         ControllerSpec("ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True),
+        ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
@@ -199,6 +200,10 @@ class Controller:
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
         self._laws = list(spec.laws)
+        for law in self._laws:
+            learning_filter = getattr(law, "filter", None)
+            if isinstance(learning_filter, ZeroPhaseFilter):
+                learning_filter.warn()
         if isinstance(spec.law, ModelBasedILC):
             settings = Settings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
