@@ -77,3 +77,7 @@ def load_scenario(name: str) -> Scenario:
         UnknownName: There is none.
     """
     return SCENARIOS[known_name("scenario", name, SCENARIOS)]
+
+
+MISMATCHES = tuple(SCENARIOS)
+"""The laboratory's list."""
