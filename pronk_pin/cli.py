@@ -5,13 +5,15 @@ from __future__ import annotations
 import sys
 import warnings
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Protocol, TextIO
+from typing import Annotated, Any, Protocol, TextIO, Union
 
 import numpy as np
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
+from ._state import known_name
 from ._urdf import mujoco_spec
 from .compare import (
     Experiment,
@@ -22,12 +24,14 @@ from .compare import (
     mjcf_parity,
     run_experiment,
 )
+from .compare.changes import format_changes
 from .compare.closing import close_loop, format_loop
 from .compare.gains import describe_gains, sweep_gains
 from .compare.prediction import compare_prediction, describe_prediction, practise
 from .compare.scenario import load_scenario
+from .compare.suites import SUITES, load_suite
 from .compare.transfer import describe_transfers, measure_transfers
-from .compare.words import format_tables
+from .compare.words import families, format_suite, format_tables
 from .control import load_controller
 from .errors import InvalidInput, LeakyFilter, PronkError
 from .gait import (
@@ -59,6 +63,8 @@ class Compare:
 
     experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
     """What to compare."""
+    suite: str = "default"
+    """A named experiment, which the other options change: default, mismatch, control, paper."""
     folder: Path | None = None
     """Results folder; by default results/<time>-comparison."""
     workers: int | None = None
@@ -68,33 +74,39 @@ class Compare:
 
     def run(self) -> None:
         """Do it."""
-        folder = self.folder or default_folder()
+        name = "comparison" if self.suite == "default" else self.suite
+        folder = self.folder or default_folder(name)
         if self.experiment.world:
             print(mjcf_parity(load_robot(self.experiment.robot), self.experiment.world).table())
         results = run_experiment(
             self.experiment, folder, workers=self.workers, executor=self.executor
         )
-        print(f"robot {self.experiment.robot}, base {self.experiment.base}")
-        for scenario in self.experiment.scenarios:
-            print(f"\nscenario {scenario}\n")
-            print(format_tables(results.summary(), scenario=scenario))
+        print(f"robot {self.experiment.robot}, base {self.experiment.base}\n")
+        _print_tables(results)
         _write_pages(results)
 
 
 @dataclass(frozen=True)
 class Report:
-    """Write report.html and replay.html of a result again, and print its table."""
+    """Write the report and the replay of a result again, and print its tables.
+
+    With two results, say what is different in the second beyond noise.
+    """
 
     result: Positional[Path]
     """Results folder."""
+    other: Positional[Path | None] = None
+    """Results folder to compare it with."""
     figures: Path | None = None
     """Write the figures into this folder too, as SVG."""
 
     def run(self) -> None:
         """Do it."""
         results = Results.load(self.result)
-        for scenario in results.experiment.scenarios:
-            print(format_tables(results.summary(), scenario=scenario))
+        if self.other is not None:
+            print(format_changes(results, Results.load(self.other)))
+            return
+        _print_tables(results)
         _write_pages(results)
         if self.figures is not None:
             for path in write_figures(results, self.figures):
@@ -469,9 +481,20 @@ class _Runs(Protocol):
     def run(self) -> int | None: ...
 
 
+def _commands(arguments: list[str]) -> Any:
+    """All commands; the defaults of `compare` are those of the suite that is asked for."""
+    words = [word for argument in arguments for word in argument.split("=", 1)]
+    following = dict(pairwise(words))
+    suite = following.get("--suite", "default")
+    known_name("suite", suite, SUITES)
+    default = Compare(experiment=load_suite(suite), suite=suite)
+    return Union[  # noqa: UP007 -- its first member is made here
+        Annotated[Compare, subcommand("compare", default=default)], Command
+    ]
+
+
 Command = (
-    Annotated[Compare, subcommand("compare")]
-    | Annotated[Gaits, subcommand("gaits")]
+    Annotated[Gaits, subcommand("gaits")]
     | Annotated[Ilc, subcommand("ilc")]
     | Annotated[View, subcommand("view")]
     | Annotated[Report, subcommand("report")]
@@ -485,7 +508,7 @@ def main(arguments: list[str] | None = None) -> int:
     usage, 130 on Ctrl-C."""
     try:
         command: _Runs = tyro.cli(
-            Command,
+            _commands(sys.argv[1:] if arguments is None else arguments),
             prog="pronk-pin",
             description="When a legged robot repeats a motion, does practice beat the model?",
             args=arguments,
@@ -513,6 +536,15 @@ def _show_warning(
 ) -> None:
     """A warning in one line, as errors are shown."""
     print(f"pronk-pin: warning: {message}", file=sys.stderr)
+
+
+def _print_tables(results: Results) -> None:
+    """Table I, overview and verdict of one world; the overviews of many and one verdict."""
+    summary, worlds = results.summary(), families(results.experiment.scenarios)
+    if len(worlds) > 1:
+        print(format_suite(summary))
+    else:
+        print(format_tables(summary, scenario=worlds[0]))
 
 
 def _write_pages(results: Results) -> None:
