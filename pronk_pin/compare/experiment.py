@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from .._state import known_name
 from .._typing import Array
-from ..control import ControllerSpec, TorqueLibrary, load_controller, phase_grid
+from ..control import BASES, ControllerSpec, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
-from ..gait import SPEEDS, load_library
+from ..gait import SPEEDS, GaitLibrary, load_library
 from ..robot import load_robot
 from .foreign import mjcf_spec
 from .metrics import steady
@@ -40,7 +41,7 @@ class Experiment:
         scenarios: Names of the worlds, composed with "+", values with "=": nominal, ideal,
             payload=2+slope, random-0-3; see `compare.scenario`.
         seeds: Seeds of the scatter at the start.
-        base: How the trunk moves: "locked" to x and z.
+        base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         world: MJCF of the robot, with the same joint names, that stands in for its URDF in the
             simulation; see `compare.foreign`. The scenarios add to what is in it: "ideal" takes it
             as it is.
@@ -58,7 +59,8 @@ class Experiment:
 
     def __post_init__(self) -> None:
         robot = load_robot(self.robot)
-        library = load_library(self.robot)
+        known_name("base", self.base, BASES)
+        library = _gaits(self.robot, self.base)
         names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
         object.__setattr__(self, "scenarios", names)
         for name in ("speeds", "controllers", "scenarios", "seeds"):
@@ -72,8 +74,6 @@ class Experiment:
             load_controller(controller)
         if min(self.seeds) < 0:
             raise InvalidInput("seeds must not be negative")
-        if self.base != "locked":
-            raise InvalidInput(f"base '{self.base}' is not available; the base can be: locked")
         if self.world:
             mjcf_spec(robot, self.world)
             object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
@@ -148,7 +148,7 @@ def run_cell(
         The strides: see `compare.strides`.
     """
     robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.world)
-    library, spec = load_library(cell.robot), load_controller(cell.controller)
+    library, spec = _gaits(cell.robot, cell.base), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]
     # One stream a seed, the same for every controller: they start from the same postures.
     rng = np.random.default_rng(np.random.SeedSequence(cell.seed))
@@ -160,9 +160,15 @@ def run_cell(
         schedule=cell.schedule,
         rng=rng,
         feedforward=_feedforward(spec, cell, practised),
+        base=cell.base,
     )
     log = simulation.run(progress)
     return to_dataset(log, robot, gaits, attributes=_attributes(cell))
+
+
+def _gaits(robot: str, base: str) -> GaitLibrary:
+    """The gaits of a base: of a trunk that may turn those that let it pitch."""
+    return load_library(robot) if base == "locked" else load_library(robot, base="sagittal")
 
 
 def torque_library(strides: xr.Dataset) -> TorqueLibrary:
@@ -175,8 +181,9 @@ def torque_library(strides: xr.Dataset) -> TorqueLibrary:
 def _feedforward(spec: ControllerSpec, cell: Cell, practised: xr.Dataset | None) -> Array | None:
     """The feedforward that a controller begins with [N m], (n, 2, samples, 12)."""
     if spec.source == "model":
-        library = load_library(cell.robot)
-        return model_feedforward(load_robot(cell.robot), [library.at(v) for v in cell.speeds])
+        library = _gaits(cell.robot, cell.base)
+        gaits = [library.at(speed) for speed in cell.speeds]
+        return model_feedforward(load_robot(cell.robot), gaits, base=cell.base)
     if spec.source == "library":
         if practised is None:
             raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
