@@ -131,7 +131,8 @@ class Balance:
         asked = np.flatnonzero(sound & (self._s[rows, 0, tick] < regulator.until))
         if asked.size == 0:
             return added
-        rows, rotation, wanted, joints = (x[asked] for x in (rows, rotation, wanted, joints))
+        rows, rotation, wanted = rows[asked], rotation[asked], wanted[asked]
+        joints = joints[asked]
         rate = -np.einsum("nij,nj->ni", rotation, spin[asked])
         rate[:, 1] += self._rate[rows, 0, tick]
         moment = regulator.moment(attitude_error(rotation, wanted), rate)
