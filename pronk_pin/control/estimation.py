@@ -39,14 +39,17 @@ class SpeedEstimator:
         """
         n, ticks = len(rows), int(log.length.max())
         used = np.arange(ticks) < log.length[:, None]
-        sound = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1) | ~used
+        pose, twist = _trunk(log, n, ticks)
+        sound = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1)
+        known = np.isfinite(pose.sum(axis=-1) + twist.sum(axis=-1)) & used
+        pose[~known], twist[~known] = _LEVEL, 0.0
+        sound = (sound & known) | ~used
         if not sound.all():
             log = replace(
                 log,
                 joints=np.nan_to_num(log.joints, posinf=0.0, neginf=0.0),
                 joint_rates=np.nan_to_num(log.joint_rates, posinf=0.0, neginf=0.0),
             )
-        pose, twist = _trunk(log, n, ticks)
         q = np.concatenate([pose, log.joints[:, :ticks]], axis=-1)
         v = np.concatenate([twist, log.joint_rates[:, :ticks]], axis=-1)
         velocity = leg_odometry(
@@ -64,10 +67,11 @@ class SpeedEstimator:
         return self.speed[rows]
 
 
+_LEVEL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
 def _trunk(log: PhaseLog, n: int, ticks: int) -> tuple[Array, Array]:
     """Trunk's pose (n, ticks, 7) and velocity (n, ticks, 6): level where nothing else is known."""
     if log.pose is not None and log.twist is not None:
-        return log.pose[:, :ticks], log.twist[:, :ticks]
-    pose = np.zeros((n, ticks, 7))
-    pose[..., 6] = 1.0
-    return pose, np.zeros((n, ticks, 6))
+        return log.pose[:, :ticks].copy(), log.twist[:, :ticks].copy()
+    return np.tile(_LEVEL, (n, ticks, 1)), np.zeros((n, ticks, 6))

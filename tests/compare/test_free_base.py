@@ -78,7 +78,7 @@ def test_a_robot_whose_trunk_may_turn_stays_up_and_straight(base: str) -> None:
 
 
 def test_a_robot_that_is_thrown_over_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    rolling = np.tile([20.0, 0.0, 0.0], 4)[None]  # all hips to one side
+    rolling = np.array([0.0, 0.0, 60.0, 0.0, 0.0, -60.0] * 2)[None]  # left against right
     monkeypatch.setattr(Balance, "torque", lambda self, *_: rolling)
     strides = pronked("free", "model", 2.0, 0.0, speeds=(0.4,))
     assert finished(strides, "upright").min() == 0.0
