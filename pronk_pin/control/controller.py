@@ -17,8 +17,10 @@ from ..errors import InvalidInput
 from ..gait import Gait, GaitPhase
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
+from .balance import BalanceSpec
 from .contacts import ContactDetector
 from .estimation import SpeedEstimator
+from .feedforward import BASES
 from .filters import ZeroPhaseFilter
 from .learning import (
     SKIPPED,
@@ -34,6 +36,7 @@ from .linearise import Settings, lifted_model
 from .model_based import ModelBasedILC, NormOptimalILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
+from .symmetry import symmetric
 from .tape import Gains, Tape
 
 SOURCES = ("none", "model", "library", "identified")
@@ -56,6 +59,7 @@ class ControllerSpec:
         flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
+        balance: Attitude and foot placement where the trunk is free to turn.
         selection: Strides worth learning from.
         contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
@@ -71,6 +75,7 @@ class ControllerSpec:
     flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
+    balance: BalanceSpec = field(default_factory=BalanceSpec)
     selection: StrideSelection = field(default_factory=StrideSelection)
     contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
@@ -180,8 +185,10 @@ class Controller:
         *,
         timestep: float,
         feedforward: Array | None = None,
+        base: str = "locked",
     ) -> None:
         n = len(gaits)
+        known_name("base", base, BASES)
         shape = (n, len(PARTS), SAMPLES, NL)
         if feedforward is None:
             feedforward = np.zeros(shape)
@@ -204,7 +211,13 @@ class Controller:
             learning_filter = getattr(law, "filter", None)
             if isinstance(learning_filter, ZeroPhaseFilter):
                 learning_filter.warn()
+        self._base = base
         if isinstance(spec.law, ModelBasedILC):
+            if base != "locked":
+                raise InvalidInput(
+                    f"controller '{spec.name}' learns by a model of the locked base; use another "
+                    "law, or base 'locked'"
+                )
             settings = Settings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
             )
@@ -217,6 +230,10 @@ class Controller:
         self._lift_off_speed = np.array(
             [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
         )
+
+    def sideways(self, rows: IntArray) -> Array:
+        """Speeds to the left with which robots left the ground [m/s], shape (m,)."""
+        return self._estimator.sideways[rows]
 
     @property
     def max_ticks(self) -> int:
@@ -265,7 +282,12 @@ class Controller:
         return tape, record
 
     def landing(
-        self, rows: IntArray, log: PhaseLog, duration: Array, upright: BoolArray | None = None
+        self,
+        rows: IntArray,
+        log: PhaseLog,
+        duration: Array,
+        upright: BoolArray | None = None,
+        tilt: Array | None = None,
     ) -> StrideRecord:
         """The end of a stride: the flight's record; whether the stride is worth learning from.
 
@@ -274,6 +296,7 @@ class Controller:
             log: What was measured in flight.
             duration: How long their strides lasted [s], shape (len(rows),).
             upright: Whether they have not fallen, shape (len(rows),); all by default.
+            tilt: Largest angle between trunk and gait [rad], shape (len(rows),); 0 by default.
         """
         record = self.record(1, rows, log)
         self._last[1].put(rows, record)
@@ -284,6 +307,9 @@ class Controller:
             last.upright[rows] = True if upright is None else upright
             reasons.append(self.spec.selection.skipped(last.take(rows)))
         reasons.append(self._stood[rows])
+        if tilt is not None:
+            far = tilt > self.spec.selection.tilt
+            reasons.append(np.where(far, SKIPPED.index("tilted"), 0))
         self.skipped[rows] = np.select([reason > 0 for reason in reasons], reasons, default=0)
         return record
 
@@ -330,5 +356,8 @@ class Controller:
             for part, law in enumerate(self._laws):
                 if law is not None:
                     record = self._last[part].take(rows)
-                    learned = law.update(given(record))
+                    told = given(record)
+                    if self._base == "free":
+                        told = symmetric(self.robot, told)
+                    learned = law.update(told)
                     self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)

@@ -27,7 +27,7 @@ class LearningLaw(Protocol):
 
 SKIPPED = (
     *("", "not finite", "fallen", "too short", "too long", "duration unknown"),
-    *("false touchdown", "contact lost"),
+    *("false touchdown", "contact lost", "tilted"),
 )
 """Why nothing is learned from a stride; the first where nothing is wrong with it."""
 
@@ -39,10 +39,13 @@ class StrideSelection:
     Attributes:
         shortest: Shortest stride, over the reference's duration.
         longest: Longest one.
+        tilt: Largest angle between trunk and gait [rad]: where a trunk that is free to turn is
+            further off, its attitude comes first.
     """
 
     shortest: float = 0.7
     longest: float = 1.4
+    tilt: float = 0.15
 
     def skipped(self, record: StrideRecord) -> IntArray:
         """Why the robots' strides are not, as an index into `SKIPPED`, shape (n,)."""
