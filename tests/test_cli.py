@@ -71,8 +71,7 @@ def test_one_speed_and_one_controller_are_a_comparison_too(
     assert "1 of 1" in capsys.readouterr().out
     assert main(["report", str(tmp_path / "one"), "--figures", str(tmp_path / "figures")]) == 0
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {
-        "errors.svg",
-        "learning.svg",
+        f"{name}.{suffix}" for name in ("errors", "learning") for suffix in ("svg", "pdf")
     }
 
 
