@@ -1,7 +1,7 @@
 """How fast the comparison loop is, beside MuJoCo alone: `python benchmarks/throughput.py`.
 
-In one run: the whole loop (control, learning and logging) on n robots, then `mujoco.rollout` playing
-the recorded controls from the same states on as many threads, which is the physical limit.
+In one run: the whole loop (control, learning and logging) on n robots, then `mujoco.rollout`
+playing the recorded controls from the same states on as many threads: the physical limit.
 `--ticks` measures the loop that computes the feedback tick by tick instead.
 """
 

@@ -1,4 +1,4 @@
-"""The command line: `pronk-pin compare | gaits | view | report | parity`."""
+"""The command line: `pronk-pin compare | gaits | view | report | explain | parity`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,17 @@ import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
 from ._urdf import mujoco_spec
-from .compare import Experiment, Results, default_folder, run_experiment
-from .compare.tables import format_tables
+from .compare import (
+    Experiment,
+    Results,
+    default_folder,
+    describe,
+    explain,
+    mjcf_parity,
+    run_experiment,
+)
+from .compare.closing import close_loop, format_loop
+from .compare.words import format_tables
 from .errors import InvalidInput, PronkError
 from .gait import (
     GaitLibrary,
@@ -24,9 +33,11 @@ from .gait import (
     load_library,
     number_range,
 )
+from .model_files import write_mjcf, write_urdf
 from .parity import compare_models
 from .robot import load_robot
 from .viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
+from .viz.explanation_figure import write_explanation_figure
 from .viz.gait_figures import write_gait_figures
 from .viz.practice import practice_programme
 from .viz.report import write_figures, write_report
@@ -45,11 +56,17 @@ class Compare:
     """Results folder; by default results/<time>-comparison."""
     workers: int | None = None
     """Processes; by default one for each core."""
+    executor: str | None = None
+    """Who simulates instead of these processes: dask://HOST:PORT of a dask scheduler."""
 
     def run(self) -> None:
         """Do it."""
         folder = self.folder or default_folder()
-        results = run_experiment(self.experiment, folder, workers=self.workers)
+        if self.experiment.world:
+            print(mjcf_parity(load_robot(self.experiment.robot), self.experiment.world).table())
+        results = run_experiment(
+            self.experiment, folder, workers=self.workers, executor=self.executor
+        )
         print(f"robot {self.experiment.robot}, base {self.experiment.base}")
         for scenario in self.experiment.scenarios:
             print(f"\nscenario {scenario}\n")
@@ -75,6 +92,58 @@ class Report:
         if self.figures is not None:
             for path in write_figures(results, self.figures):
                 print(f"figure   {path}")
+
+
+@dataclass(frozen=True)
+class Explain:
+    """Take the learned torque of a result apart: rotors, friction, load, motors, and the rest.
+
+    Prints what the model lacks, with intervals, how much of the learned torque each cause explains,
+    and what cannot be told apart. The mended model can be written to a file, and tried out.
+    """
+
+    result: Positional[Path]
+    """Results folder."""
+    controller: str = "ilc"
+    """Whose strides."""
+    scenario: str | None = None
+    """In which scenario; by default the first."""
+    figure: Path | None = None
+    """Draw the learned torque by cause into this file: png, svg or pdf."""
+    speed: float | None = None
+    """Speed that the figure shows [m/s]; by default the one nearest to 0.5."""
+    write_urdf: Path | None = None
+    """Write the mended model to this URDF."""
+    write_mjcf: Path | None = None
+    """Write the mended model to this MJCF."""
+    close_loop: bool = False
+    """Try the mended model, with its gaits optimised again, beside the model, the torque library
+    and practice, at speeds halfway between those of the result and with 3 kg more."""
+    imu_noise: float = 0.0
+    """Standard deviation of noise added to the trunk's acceleration [m/s^2]."""
+    draws: int = 300
+    """How often strides are drawn anew for the intervals."""
+    seed: int = 0
+    """Seed of the draws and the noise."""
+
+    def run(self) -> None:
+        """Do it."""
+        if self.seed < 0:
+            raise InvalidInput(f"seed={self.seed}; give a number from 0 on")
+        results = Results.load(self.result)
+        cell = results.find(controller=self.controller, scenario=self.scenario)
+        strides, rng = results.strides(cell), np.random.default_rng(self.seed)
+        found = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
+        print(f"{cell.controller} in scenario {cell.scenario}\n\n{describe(found)}")
+        if self.figure is not None:
+            print(f"\nfigure  {write_explanation_figure(found, self.figure, speed=self.speed)}")
+        notes = [f"{found.robot.name}, mended by what practice found", "", describe(found)]
+        if self.write_urdf is not None:
+            print(f"\nurdf    {write_urdf(found.mended, self.write_urdf, notes)}")
+        if self.write_mjcf is not None:
+            print(f"\nmjcf    {write_mjcf(found.mended, self.write_mjcf, notes)}")
+        if self.close_loop:
+            print(f"\n{format_loop(close_loop(found, strides, rng=rng))}")
 
 
 @dataclass(frozen=True)
@@ -324,6 +393,7 @@ Command = (
     | Annotated[Gaits, subcommand("gaits")]
     | Annotated[View, subcommand("view")]
     | Annotated[Report, subcommand("report")]
+    | Annotated[Explain, subcommand("explain")]
     | Annotated[Parity, subcommand("parity")]
 )
 

@@ -38,7 +38,10 @@ def failure(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_compare_writes_everything_it_names(result: Path) -> None:
     names = {path.name for path in result.iterdir()}
-    assert names == {"config.json", "replay.html", "report.html", "strides", "summary.csv"}
+    assert names == {
+        *("config.json", "provenance.json", "summary.csv", "strides"),
+        *("report.html", "replay.html"),
+    }
     assert {path.name for path in (result / "strides").iterdir()} == {
         "pd_nominal_0.nc",
         "ilc_nominal_0.nc",

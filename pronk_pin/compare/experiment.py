@@ -7,7 +7,10 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -16,14 +19,22 @@ from .._typing import Array
 from ..control import ControllerSpec, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
-from ..gait import SPEEDS, load_library
-from ..robot import load_robot
+from ..gait import SPEEDS, Gait, load_library
+from ..robot import Robot, load_robot
+from .explanation import explain, mended_gaits
+from .foreign import mjcf_spec
 from .metrics import steady
 from .scenario import load_scenario
 from .simulate import Progress, Schedule, Simulation
 from .strides import to_dataset
 
+LEARNED = ("library", "identified")
+"""Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
+
 DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
+
+PRACTISED = ("count", "learning", "feedforward")
+"""What of a practised cell's strides the torque library is made of."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +45,13 @@ class Experiment:
         robot: Short name of the robot.
         speeds: Desired speeds [m/s].
         controllers: Short names of the controllers: any of `control.CONTROLLERS`.
-        scenarios: Short names of the worlds: ideal, nominal, payload, weak-motors, soft-ground.
+        scenarios: Names of the worlds, composed with "+", values with "=": nominal, ideal,
+            payload=2+slope, random-0-3; see `compare.scenario`.
         seeds: Seeds of the scatter at the start.
         base: How the trunk moves: "locked" to x and z.
+        world: MJCF of the robot, with the same joint names, that stands in for its URDF in the
+            simulation; see `compare.foreign`. The scenarios add to what is in it: "ideal" takes it
+            as it is.
         schedule: What happens when.
     """
 
@@ -46,11 +61,14 @@ class Experiment:
     scenarios: tuple[str, ...] = ("nominal",)
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
+    world: str = ""
     schedule: Schedule = field(default_factory=Schedule)
 
     def __post_init__(self) -> None:
-        load_robot(self.robot)
+        robot = load_robot(self.robot)
         library = load_library(self.robot)
+        names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
+        object.__setattr__(self, "scenarios", names)
         for name in ("speeds", "controllers", "scenarios", "seeds"):
             values = tuple(getattr(self, name))
             object.__setattr__(self, name, values)  # a list would not equal what is read back
@@ -60,22 +78,33 @@ class Experiment:
             library.at(speed)
         for controller in self.controllers:
             load_controller(controller)
-        for scenario in self.scenarios:
-            load_scenario(scenario)
         if min(self.seeds) < 0:
             raise InvalidInput("seeds must not be negative")
         if self.base != "locked":
             raise InvalidInput(f"base '{self.base}' is not available; the base can be: locked")
+        if self.world:
+            mjcf_spec(robot, self.world)
+            object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
         object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
 
     def cells(self) -> tuple[Cell, ...]:
         """The simulations, in an order in which each finds what it depends on done before it."""
         controllers = list(self.controllers)
-        if "library" in controllers:
-            controllers = ["ilc", *(c for c in controllers if c not in ("ilc", "library"))]
-            controllers.append("library")
+        later = [name for name in controllers if load_controller(name).source in LEARNED]
+        if later:
+            others = [name for name in controllers if name not in ("ilc", *later)]
+            controllers = ["ilc", *others, *later]
         return tuple(
-            Cell(self.robot, self.speeds, controller, scenario, seed, self.base, self.schedule)
+            Cell(
+                self.robot,
+                self.speeds,
+                controller,
+                scenario,
+                seed,
+                self.base,
+                self.world,
+                self.schedule,
+            )
             for controller in controllers
             for scenario in self.scenarios
             for seed in self.seeds
@@ -92,6 +121,7 @@ class Cell:
     scenario: str
     seed: int
     base: str
+    world: str
     schedule: Schedule
 
     @property
@@ -101,8 +131,8 @@ class Cell:
 
     @property
     def practised(self) -> Cell | None:
-        """The cell in which the torque library is learned, for a cell that replays it."""
-        if load_controller(self.controller).source != "library":
+        """The cell that learns what this one uses: the torque library, or the mended model."""
+        if load_controller(self.controller).source not in LEARNED:
             return None
         return dataclasses.replace(self, controller="ilc")
 
@@ -126,9 +156,13 @@ def run_cell(
     Returns:
         The strides: see `compare.strides`.
     """
-    robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario)
+    robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.world)
     library, spec = load_library(cell.robot), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]
+    mended = robot
+    if spec.source == "identified":
+        mended = explain(_learned(spec, practised)).mended
+        gaits = mended_gaits(mended, gaits) if spec.mended_gaits else gaits
     # One stream a seed, the same for every controller: they start from the same postures.
     rng = np.random.default_rng(np.random.SeedSequence(cell.seed))
     simulation = Simulation(
@@ -138,7 +172,7 @@ def run_cell(
         scenario,
         schedule=cell.schedule,
         rng=rng,
-        feedforward=_feedforward(spec, cell, practised),
+        feedforward=_feedforward(spec, mended, gaits, practised),
     )
     log = simulation.run(progress)
     return to_dataset(log, robot, gaits, attributes=_attributes(cell))
@@ -146,31 +180,40 @@ def run_cell(
 
 def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     """The torque library learned in a simulation: means over its steady strides (section III.B)."""
-    torque = steady(strides)["feedforward"].interp(phase=phase_grid())
+    torque = steady(strides)["feedforward"].interp(phase=phase_grid(), method="cubic")
     torque = torque.transpose("speed", "stride", "part", "phase", "joint")
     return TorqueLibrary.from_strides(strides["speed"].to_numpy(), torque.to_numpy())
 
 
-def _feedforward(spec: ControllerSpec, cell: Cell, practised: xr.Dataset | None) -> Array | None:
+def _feedforward(
+    spec: ControllerSpec, robot: Robot, gaits: Sequence[Gait], practised: xr.Dataset | None
+) -> Array | None:
     """The feedforward that a controller begins with [N m], (n, 2, samples, 12)."""
-    if spec.source == "model":
-        library = load_library(cell.robot)
-        return model_feedforward(load_robot(cell.robot), [library.at(v) for v in cell.speeds])
+    if spec.source in ("model", "identified"):
+        return model_feedforward(robot, gaits)
     if spec.source == "library":
-        if practised is None:
-            raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
-        return torque_library(practised).at(np.asarray(cell.speeds))
+        learned = torque_library(_learned(spec, practised))
+        return learned.at(np.array([gait.speed for gait in gaits]))
     return None
 
 
+def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
+    if practised is None:
+        raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
+    return practised
+
+
 def _attributes(cell: Cell) -> dict[str, str | int | float]:
-    scenario = dataclasses.asdict(load_scenario(cell.scenario))
+    scenario = load_scenario(cell.scenario, mjcf=cell.world)
+    world = hashlib.sha256(Path(cell.world).read_bytes()).hexdigest() if cell.world else ""
     return {
         "robot": cell.robot,
         "base": cell.base,
         "scenario": cell.scenario,
         "controller": cell.controller,
         "seed": cell.seed,
-        "scenario_parameters": repr(scenario),
-        "timestep": scenario["timestep"],
+        "scenario_parameters": scenario.to_json(),
+        "world": cell.world,
+        "world_sha256": world,
+        "timestep": scenario.timestep,
     }

@@ -78,6 +78,11 @@ class TickLog:
         given = clip_torque(feedback, feedforward, tau_max)
         self.missing[rows, ticks] = given - feedback - feedforward
 
+    def take_torques(self, rows: IntArray, other: TickLog) -> None:
+        """Take over what another log has of the torques."""
+        for name in self._TORQUES:
+            getattr(self, name)[rows] = getattr(other, name)[rows]
+
     def phase(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
         """What the controller knows of a phase that has ended after so many ticks (m,)."""
         ticks = slice(int(length.max()))
@@ -89,6 +94,7 @@ class TickLog:
             self.missing[rows, ticks],
             length,
             felt,
+            self.force[rows, ticks, :, 2].sum(axis=-1),
         )
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:

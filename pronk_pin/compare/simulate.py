@@ -6,18 +6,20 @@ A stance ends by time, as its reference does; a flight ends with the touchdown t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from .._typing import Array, IntArray
-from ..control import Controller, ControllerSpec, Tape, clip_torque, phase_grid
+from ..control import Controller, ControllerSpec, PhaseLog, Tape, clip_torque, phase_grid
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..robot import Robot
+from .motors import Motors
 from .record import StrideLog, TickLog
 from .scenario import Scenario
+from .sensors import SensorSuite
 from .world import Motion, World, finite, without_warnings
 
 Progress: TypeAlias = Callable[[int], object]
@@ -31,9 +33,6 @@ _EXPECTED_TOUCHDOWN = 0.9
 
 _CHUNK = 20
 """Ticks that are played in one go from then on; what comes after a touchdown is thrown away."""
-
-TOUCHDOWN_LOAD = 0.1
-"""Share of the weight on the feet that counts as a touchdown."""
 
 _FALLEN = 0.6
 """Trunk height, over that of the gait's lowest point, below which a robot has fallen."""
@@ -93,7 +92,8 @@ class Simulation:
         rng: Source of the scatter at the start.
         feedforward: Feedforward to begin with [N m], shape (n, 2, samples, 12).
         chunked: Let servos play whole tapes, as MuJoCo can where the law is affine between two
-            events; otherwise the feedback is computed tick by tick. The motion is the same.
+            events; otherwise the feedback is computed tick by tick, as it always is where the
+            scenario is not affine. The motion is the same.
         threads: Threads that share the robots, see `World`.
     """
 
@@ -113,12 +113,17 @@ class Simulation:
         n, dt = len(gaits), scenario.timestep
         self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
         self.controller = Controller(robot, gaits, spec, timestep=dt, feedforward=feedforward)
-        self._gains, self._chunked, self._tau_max = spec.gains, chunked, robot.tau_max
-        servo = spec.gains if chunked else None
+        self._gains, self._tau_max = spec.gains, robot.tau_max
+        self._chunked = chunked and scenario.affine
+        servo = spec.gains if self._chunked else None
         self.world = World(robot, scenario, n, servo=servo, threads=threads)
+        self._motors = Motors(scenario, robot.tau_max, n)
+        self._sensors = SensorSuite(scenario.sensors, n, rng.spawn(1)[0])
         self._log = TickLog(n, self.controller.max_ticks)
+        # What the robots believe: the truth itself, where they compute nothing of their own.
+        self._seen = self._log if self._chunked else TickLog(n, self.controller.max_ticks)
         self._late = spec.touchdown_ticks
-        self._load = TOUCHDOWN_LOAD * robot.mass * robot.gravity
+        self._load = spec.contact.touchdown * robot.mass * robot.gravity
         flight = np.array([gait.flight.duration for gait in gaits])
         self._earliest = np.round(_EARLIEST_TOUCHDOWN * flight / dt).astype(np.intp)
         self._expected = np.round(_EXPECTED_TOUCHDOWN * flight / dt).astype(np.intp)
@@ -164,28 +169,55 @@ class Simulation:
         ticks = round(self.schedule.startup / self._dt) + late
         for piece in np.array_split(np.arange(ticks), -(-ticks // self._log.size)):
             self._play(rows, self.controller.stand(len(piece)))
-        self._log.rewind(rows, np.full(len(rows), len(piece) - late), late)
+        self._rewind(rows, np.full(len(rows), len(piece) - late))
 
     def _stride(self, rows: IntArray, *, steps: int) -> None:
         """One stride, from touchdown to touchdown, of those robots."""
-        controller, strides, log, late = self.controller, self.strides, self._log, self._late
+        controller, strides, log = self.controller, self.strides, self._log
+        seen, late = self._seen, self._late
         start = self._clock[rows]
         learning = start >= round(self.schedule.practice / self._dt)
         learning &= any(law is not None for law in controller.spec.laws)
         strides.begin(rows, self._seconds(start), learning, left=self._seconds(steps - start))
 
         stance = self._play(rows, controller.touchdown(rows, learning))
-        tape, record = controller.liftoff(rows, log.phase(rows, stance, felt=late))
+        tape, record = controller.liftoff(rows, self._measured(rows, stance, felt=late))
+        if seen is not log:  # what is kept is the truth
+            record = controller.record(0, rows, log.phase(rows, stance, felt=late))
         strides.stance(rows, record, log, stance)
 
         # A touchdown is felt late: the last ticks of the flight's tape are the next stance's.
         flight = self._play(rows, tape, airborne=True) - late
         duration, upright = self._seconds(stance + flight), self.upright[rows]
-        record = controller.landing(rows, log.phase(rows, flight), duration, upright)
+        record = controller.landing(rows, self._measured(rows, flight), duration, upright)
+        if seen is not log:
+            record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)
-        log.rewind(rows, flight, late)
+        self._rewind(rows, flight)
         strides.end(rows, duration, log.base[rows, 0, 0], upright, controller.skipped[rows])
         self._clock[rows] = start + stance + flight
+
+    def _measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+        """What the robots measured in a part of the stride of so many ticks (m,)."""
+        phase = self._seen.phase(rows, length, felt=felt)
+        if not self.controller.spec.imu:
+            return phase
+        # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
+        rate = self._log.base_rate[rows, : int(length.max()) + 1]
+        if rate.shape[1] == int(length.max()):
+            rate = np.concatenate([rate, rate[:, -1:]], axis=1)
+        force = np.zeros((*rate[:, 1:].shape[:2], 3))
+        force[..., [0, 2]] = np.diff(rate, axis=1) / self._dt
+        last = np.arange(len(rows)), length - 1
+        force[last] = force[last[0], np.maximum(length - 2, 0)]  # the log ends there
+        force -= self.world.scenario.gravity_vector
+        _, force = self._sensors.imu(rows, np.zeros_like(force), force)
+        return replace(phase, specific_force=force)
+
+    def _rewind(self, rows: IntArray, start: IntArray) -> None:
+        """The ticks from `start` (m,) on, in which a touchdown was not felt, are the stance's."""
+        for log in {id(log): log for log in (self._log, self._seen)}.values():
+            log.rewind(rows, start, self._late)
 
     def _seconds(self, ticks: IntArray) -> Array:
         return np.asarray(ticks * self._dt, dtype=float)
@@ -196,25 +228,32 @@ class Simulation:
         Returns:
             How many ticks were played, shape (m,).
         """
-        world, log = self.world, self._log
+        world, log, seen = self.world, self._log, self._seen
         told = tape.setpoint(self._gains) if self._chunked else None
         played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
         while going.size:
             who, end = rows[going], int(tape.length[going].max())
             if told is None:
-                stop, control = tick + 1, self._torque(who, tape, going, tick)[:, None]
+                stop = tick + 1
+                encoders = self._sensors.encoders(who, world.joints[who], world.joint_rates[who])
+                torque = self._torque(encoders, tape, going, tick)
+                torque = self._motors.drive(who, torque, world.joint_rates[who])
+                motion = world.play(who, torque[:, None])
+                felt = self._felt(who, motion, encoders)
+                seen.write(who, tick, felt)
             else:
                 stop = min(self._next_stop(who, tick), end) if airborne else end
-                control = told[going, tick:stop]
-            motion = world.play(who, control)
+                motion = felt = world.play(who, told[going, tick:stop])
             log.write(who, tick, motion)
-            played[going] = self._ends(who, motion, tick, tape.length[going], airborne)
+            played[going] = self._ends(who, felt, tick, tape.length[going], airborne)
             world.advance(who, motion, np.minimum(played[going], stop) - tick)
             self._restart_broken(who)
             going, tick = going[played[going] > stop], stop
         if airborne:
             played = np.maximum(played, 1 + self._late)  # even if it broke before
-        log.torques(rows, tape, self._gains, self._tau_max, int(played.max()))
+        seen.torques(rows, tape, self._gains, self._tau_max, int(played.max()))
+        if seen is not log:
+            log.take_torques(rows, seen)
         return played
 
     def _next_stop(self, rows: IntArray, tick: int) -> int:
@@ -222,21 +261,32 @@ class Simulation:
         expected = int(self._expected[rows].min())
         return expected if tick < expected else tick + _CHUNK
 
-    def _torque(self, rows: IntArray, tape: Tape, going: IntArray, tick: int) -> Array:
+    def _torque(
+        self, encoders: tuple[Array, Array], tape: Tape, going: IntArray, tick: int
+    ) -> Array:
         """Torques of the feedback law at one tick, shape (m, 12)."""
-        world, gains = self.world, self._gains
-        feedback = gains.feedback(
-            tape.position[going, tick] - world.joints[rows],
-            tape.velocity[going, tick] - world.joint_rates[rows],
+        joints, rates = encoders
+        feedback = self._gains.feedback(
+            tape.position[going, tick] - joints, tape.velocity[going, tick] - rates
         )
         return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
+
+    def _felt(self, rows: IntArray, motion: Motion, encoders: tuple[Array, Array]) -> Motion:
+        """One tick's motion as the robots know it."""
+        joints, rates = encoders
+        return motion._replace(
+            joints=joints[:, None],
+            joint_rates=rates[:, None],
+            force=self._sensors.feet(rows, motion.force),
+        )
 
     def _ends(
         self, rows: IntArray, motion: Motion, tick: int, length: IntArray, airborne: bool
     ) -> IntArray:
         """Ticks after which the phases end, beyond the motion where they do not end in it.
 
-        Robots that fall in it, or that miss their touchdown, are noted as such.
+        Robots that fall in it are noted as such. One that misses its touchdown has not fallen: its
+        flight ends late, with the legs held out, and the next stance begins.
         """
         count = tick + 1 + np.arange(motion.base.shape[1])  # ticks played after each step
         over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
@@ -247,10 +297,7 @@ class Simulation:
         ended = over.any(axis=1)
         ends[ended] = count[np.argmax(over[ended], axis=1)]
         too_low = motion.base[..., 1] < self._floor[rows, None]
-        fallen = (too_low & (count <= ends[:, None])).any(axis=1)
-        if airborne:
-            fallen |= ends == length
-        self.upright[rows] &= ~fallen
+        self.upright[rows] &= ~(too_low & (count <= ends[:, None])).any(axis=1)
         return ends
 
     def _restart_broken(self, rows: IntArray) -> None:

@@ -14,16 +14,19 @@ from typing import NamedTuple
 import mujoco
 import mujoco.rollout
 import numpy as np
-import pinocchio as pin
 
 from .._typing import Array, BoolArray, IntArray
 from .._urdf import mujoco_spec
 from ..control import Gains
 from ..robot import Robot
+from .foreign import mjcf_spec
+from .ground import add_ground, name_feet
+from .motors import push_force
 from .scenario import Scenario
+from .trunk import load_trunk
 
-_FLOOR = "floor"
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_CONTROL, _PUSHED = mujoco.mjtState.mjSTATE_CTRL, mujoco.mjtState.mjSTATE_XFRC_APPLIED
 
 
 def build_model(
@@ -32,13 +35,14 @@ def build_model(
     """Compile the robot in its world.
 
     Args:
-        robot: The robot, whose URDF is used.
-        scenario: What the world adds to the URDF.
+        robot: The robot, whose URDF is used if the scenario names no MJCF.
+        scenario: What the world adds to that.
         free: Leave the trunk its six degrees of freedom instead of x and z only.
         servo: Gains of servos at the joints, see `World`; without them torque motors.
     """
-    spec = mujoco_spec(robot)
+    spec = mjcf_spec(robot, scenario.mjcf) if scenario.mjcf else mujoco_spec(robot)
     spec.option.timestep = scenario.timestep
+    spec.option.gravity = scenario.gravity_vector
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -54,41 +58,22 @@ def build_model(
             spec.delete(joint)
         for name, axis in (("x", [1, 0, 0]), ("z", [0, 0, 1])):
             trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    _add_payload(trunk, scenario)
+    load_trunk(trunk, scenario)
     _add_motors(spec, robot, scenario, servo)
-    _name_feet(spec, robot)
-    _add_ground(spec, robot, scenario)
+    name_feet(spec, robot)
+    add_ground(spec, robot, scenario)
     return spec.compile()
 
 
-def _add_payload(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
-    """Merge the payload into the trunk's inertia (a body of its own would be fused wrongly)."""
-    if scenario.payload == 0.0:
-        return
-    flat = np.zeros(9)
-    mujoco.mju_quat2Mat(flat, np.array(trunk.iquat))
-    rotation = flat.reshape(3, 3)
-    inertia = rotation @ np.diag(trunk.inertia) @ rotation.T
-    own = pin.Inertia(float(trunk.mass), np.array(trunk.ipos), inertia)
-    point = pin.Inertia(scenario.payload, np.array(scenario.payload_position), np.zeros((3, 3)))
-    both = own + point
-    principal, axes = np.linalg.eigh(both.inertia)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, axes.ravel())
-    trunk.mass, trunk.ipos = both.mass, both.lever
-    trunk.inertia, trunk.iquat = principal, quaternion
-
-
 def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario, servo: Gains | None) -> None:
-    """A motor at every joint, with the friction and the rotor that the URDF leaves out."""
+    """A motor at every joint; rotor and friction come on top of the joint's own."""
     constant = scenario.torque_constant
     for index, name in enumerate(robot.joint_names):
         joint = spec.joint(name)
-        joint.armature = scenario.armature
-        joint.damping = [scenario.damping, 0, 0]
-        joint.frictionloss = scenario.coulomb
+        joint.armature += scenario.armature
+        linear, *higher = joint.damping
+        joint.damping = [linear + scenario.damping, *higher]
+        joint.frictionloss += scenario.coulomb
         # The default time constant of 0.02 s would smear Coulomb friction into a damper.
         joint.solref_friction = [0.002, 1]
         joint.actfrclimited = False  # the limit is the controller's or the servo's business
@@ -101,47 +86,6 @@ def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario, servo: Ga
             motor.biasprm = [0.0, -constant * kp, -constant * kd] + [0] * 7
             limit = constant * robot.tau_max[index]
             motor.forcerange, motor.forcelimited = [-limit, limit], True
-
-
-def _name_feet(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """The sphere that each foot stands on; one of our own where the URDF has a mesh instead."""
-    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    for leg, foot, foot_id in zip(robot.legs, robot.foot_names, robot.foot_ids, strict=True):
-        calf = spec.joint(robot.spec.leg_joints(leg)[-1]).parent
-        centre = np.array(robot.model.frames[foot_id].placement.translation)
-        geom = next((geom for geom in calf.geoms if geom.type == sphere), None)
-        if geom is None:
-            geom = calf.add_geom(type=sphere, pos=centre, size=[robot.foot_radius, 0, 0])
-        geom.name = foot
-
-
-def _add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
-    """The floor, and sensors of the force between it and each foot."""
-    contact = {
-        "solref": [scenario.ground_time_constant, 1],
-        "friction": [scenario.ground_friction, 0.005, 0.0001],
-        "condim": 3,
-    }
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(
-        name=_FLOOR, type=plane, size=[0, 0, 1], contype=1, conaffinity=0, **contact
-    )
-    for geom in spec.geoms:
-        if geom.name != _FLOOR:
-            geom.contype, geom.conaffinity = 0, 1  # the robot meets the floor, not itself
-            geom.solref, geom.friction, geom.condim = contact.values()
-    for foot in robot.foot_names:
-        force = mujoco.mjtConDataField.mjCONDATA_FORCE
-        spec.add_sensor(
-            name=foot,
-            type=mujoco.mjtSensor.mjSENS_CONTACT,
-            objtype=mujoco.mjtObj.mjOBJ_GEOM,
-            objname=foot,
-            reftype=mujoco.mjtObj.mjOBJ_GEOM,
-            refname=_FLOOR,
-            # data fields, reduction (3: net force in the world frame), number of contacts
-            intprm=[1 << int(force), 3, 1],
-        )
 
 
 @contextmanager
@@ -217,6 +161,10 @@ class World:
         self._base_rate = np.array([1 + nq + model.joint(name).dofadr[0] for name in ("x", "z")])
         address = [model.sensor(name).adr[0] for name in robot.foot_names]
         self._force = np.array(address)[:, None] + np.arange(3)
+        # Forces on the bodies come after the motors' controls: force and moment, in the world.
+        self._control = int(_CONTROL | _PUSHED if scenario.pushes else _CONTROL)
+        trunk = model.body(robot.spec.base_link).id
+        self._push = model.nu + 6 * trunk + np.arange(3)
         self._state = np.zeros((n, mujoco.mj_stateSize(model, _FULL)))
         self._warmstart = np.zeros((n, model.nv))
         self.force = np.zeros((n, *self._force.shape))
@@ -251,8 +199,11 @@ class World:
         m, ticks = control.shape[:2]
         path = np.empty((m, ticks + 1, self._state.shape[1]))
         path[:, 0] = self._state[rows]
-        told = np.empty((m, ticks, self.model.nu))
+        told = np.zeros((m, ticks, mujoco.mj_stateSize(self.model, self._control)))
         told[..., self._ctrl] = control
+        if self.scenario.pushes:
+            time = path[:, :1, 0] + self.scenario.timestep * np.arange(ticks)  # (m, ticks)
+            told[..., self._push] = push_force(self.scenario, time)
         states = np.empty((m, ticks, path.shape[2]))
         sensors = np.empty((m, ticks, self.model.nsensordata))
         self._rollout.rollout(
@@ -260,6 +211,7 @@ class World:
             self._data,
             path[:, 0].copy(),
             told,
+            control_spec=self._control,
             skip_checks=True,
             nstep=ticks,
             initial_warmstart=self._warmstart[rows],

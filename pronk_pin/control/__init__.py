@@ -1,5 +1,6 @@
 """What the robot is told to do: feedback, feedforward and learning, one tape a phase."""
 
+from .contacts import ContactDetector, StanceContact
 from .controller import CONTROLLERS, Controller, ControllerSpec, load_controller
 from .filters import ZeroPhaseFilter
 from .learning import (
@@ -26,6 +27,7 @@ __all__ = [
     "PARTS",
     "SAMPLES",
     "SKIPPED",
+    "ContactDetector",
     "Controller",
     "ControllerSpec",
     "CurrentIterationILC",
@@ -40,6 +42,7 @@ __all__ = [
     "PhaseLog",
     "PlantInversionILC",
     "Settings",
+    "StanceContact",
     "StrideRecord",
     "StrideSelection",
     "Tape",

@@ -17,6 +17,7 @@ from ..errors import InvalidInput
 from ..gait import Gait, GaitPhase
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
+from .contacts import ContactDetector
 from .estimation import SpeedEstimator
 from .filters import ZeroPhaseFilter
 from .learning import (
@@ -35,7 +36,7 @@ from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape
 
-SOURCES = ("none", "model", "library")
+SOURCES = ("none", "model", "library", "identified")
 """Where a controller's first feedforward can come from."""
 
 LATEST_TOUCHDOWN = 2.0
@@ -48,25 +49,32 @@ class ControllerSpec:
 
     Attributes:
         name: Short name, as on the command line.
-        source: Where its feedforward comes from at first: "none", "model" or "library".
+        source: Where its feedforward comes from at first: "none", "model", "library", or
+            "identified", the model mended by what practice found.
+        mended_gaits: Play gaits that were optimised again with the mended model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
         selection: Strides worth learning from.
+        contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
+        imu: Whether an accelerometer on the trunk helps that estimate.
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
             contact sensor is one late, and the contact began between two ticks.
     """
 
     name: str
     source: str = "none"
+    mended_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
     selection: StrideSelection = field(default_factory=StrideSelection)
+    contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
+    imu: bool = False
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
@@ -80,17 +88,31 @@ class ControllerSpec:
         return self.law, self.flight_law
 
 
+FLIGHT_LAW = PDTypeILC(
+    leak=0.02,
+    delta=0.04,
+    # The error's rate would learn the vibration of the leg after lift-off.
+    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    filter=ZeroPhaseFilter.butterworth(3, 0.04),
+)
+"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
+
 CONTROLLERS = {
     spec.name: spec
     for spec in (
         ControllerSpec("pd"),
-        ControllerSpec("ilc", law=PDTypeILC()),
+        ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW),
         ControllerSpec("model", source="model"),
         ControllerSpec("library", source="library"),
-        ControllerSpec("model+ilc", source="model", law=PDTypeILC()),
+        ControllerSpec("model+ilc", source="model", law=PDTypeILC(), flight_law=FLIGHT_LAW),
+        ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
+        ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
+        ControllerSpec("ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
@@ -172,6 +194,7 @@ class Controller:
         self._timestep = timestep
         self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
         self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
+        self._stood = np.zeros(n, dtype=np.intp)  # why a stance was none, index into `SKIPPED`
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
@@ -223,7 +246,9 @@ class Controller:
 
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
         """Flight tapes for robots that have just finished a stance, and the stance's record."""
-        record = self._record(0, rows, log)
+        record = self.record(0, rows, log)
+        self._last[0].put(rows, record)
+        self._stood[rows] = self._judge_contact(log)
         speed = self._estimator.update(rows, log)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         share, rate = self._turn[rows] * turn, self._turn_rate[rows] * turn  # (m, ticks)
@@ -245,29 +270,44 @@ class Controller:
             duration: How long their strides lasted [s], shape (len(rows),).
             upright: Whether they have not fallen, shape (len(rows),); all by default.
         """
-        record = self._record(1, rows, log)
+        record = self.record(1, rows, log)
+        self._last[1].put(rows, record)
         relative = duration / (self._stance.duration[rows] + self._flight.duration[rows])
         reasons = []
         for last in self._last:
             last.relative_duration[rows] = relative
             last.upright[rows] = True if upright is None else upright
             reasons.append(self.spec.selection.skipped(last.take(rows)))
-        self.skipped[rows] = np.where(reasons[0] > 0, reasons[0], reasons[1])
+        reasons.append(self._stood[rows])
+        self.skipped[rows] = np.select([reason > 0 for reason in reasons], reasons, default=0)
         return record
+
+    def _judge_contact(self, log: PhaseLog) -> IntArray:
+        """Why stances were none, as indices into `SKIPPED`, shape (m,)."""
+        if log.load is None:
+            return np.zeros(len(log.length), dtype=np.intp)
+        detector = self.spec.contact
+        stance = detector.stance(log.load / (self.robot.mass * self.robot.gravity), log.length)
+        wrong = [detector.false_touchdown(stance, log.length), detector.contact_lost(stance)]
+        names = [SKIPPED.index("false touchdown"), SKIPPED.index("contact lost")]
+        return np.asarray(np.select(wrong, names, default=0), dtype=np.intp)
 
     def _played(self, part: int, rows: IntArray) -> Array:
         """The feedforward at the ticks of a part, shape (m, ticks, 12)."""
         phase = (self._stance, self._flight)[part].phase[rows]
         return resample(self.feedforward[rows, part], phase * (SAMPLES - 1))
 
-    def _record(self, part: int, rows: IntArray, log: PhaseLog) -> StrideRecord:
-        """What was measured in a part of the stride, aligned on t / T of the reference."""
+    def record(self, part: int, rows: IntArray, log: PhaseLog) -> StrideRecord:
+        """The record of what was measured in a part of the stride (an index into `PARTS`).
+
+        Aligned on t / T of the reference.
+        """
         reference = (self._stance, self._flight)[part]
         index = log.index(phase_grid(), reference.duration[rows] / self._timestep)
         ticks = slice(min(reference.position.shape[1], log.joints.shape[1]))
         error = reference.position[rows, ticks] - log.joints[:, ticks]
         rate = reference.velocity[rows, ticks] - log.joint_rates[:, ticks]
-        record = StrideRecord(
+        return StrideRecord(
             error=resample(error, index),
             error_rate=resample(rate, index),
             feedback=resample(log.feedback, index),
@@ -278,8 +318,6 @@ class Controller:
             upright=np.ones(len(rows), dtype=bool),
             robot=rows,
         )
-        self._last[part].put(rows, record)
-        return record
 
     def _learn(self, rows: IntArray) -> None:
         """Update the feedforward of some robots from their last stride."""

@@ -27,7 +27,10 @@ class LearningLaw(Protocol):
         ...
 
 
-SKIPPED = ("", "not finite", "fallen", "too short", "too long", "duration unknown")
+SKIPPED = (
+    *("", "not finite", "fallen", "too short", "too long", "duration unknown"),
+    *("false touchdown", "contact lost"),
+)
 """Why nothing is learned from a stride; the first where nothing is wrong with it."""
 
 
@@ -55,7 +58,7 @@ class StrideSelection:
             duration > self.longest,
             np.isnan(duration),
         ]
-        return np.asarray(np.select(checks, range(1, len(SKIPPED)), default=0), dtype=np.intp)
+        return np.asarray(np.select(checks, range(1, len(checks) + 1), default=0), dtype=np.intp)
 
     def usable(self, record: StrideRecord) -> BoolArray:
         """Which robots' strides are, shape (n,)."""
@@ -106,16 +109,16 @@ class PDTypeILC:
     Attributes:
         gain: Learning gain; 0 to 1.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase; shorter ones leave more ripple from stride to stride.
+        delta: Look-ahead in phase; what the feedforward does takes a while to show in the error.
         gains: Weights of the error and its rate: eq. (10).
         filter: The learning filter Q.
     """
 
     gain: float = 0.5
-    leak: float = 0.005
-    delta: float = 0.09
+    leak: float = 0.03
+    delta: float = 0.06
     gains: Gains = field(default_factory=Gains)
-    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.04))
+    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.08))
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.gain < 2.0 and 0.0 <= self.leak <= 1.0 and 0.0 <= self.delta < 1.0):

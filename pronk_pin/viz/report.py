@@ -13,7 +13,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from ..compare import Results
-from ..compare.tables import SHOWN, beside_the_paper, overview, verdict
+from ..compare.tables import SHOWN, beside_the_paper, overview
+from ..compare.words import verdict
 from ..errors import cannot_write
 from . import figures
 from .style import figure_bytes, save_figure
@@ -101,7 +102,7 @@ def report_html(results: Results) -> str:
         body="\n".join(sections),
         limits="".join(f"<li>{html.escape(text)}</li>" for text in _LIMITS),
         command=html.escape(command(results)),
-        provenance=_provenance(results.config),
+        provenance=_provenance(results.provenance),
     )
 
 
@@ -204,14 +205,16 @@ def _table_1(table: pd.DataFrame) -> str:
     return str(shown.to_html(border=0)) + note
 
 
-def _provenance(config: Any) -> str:
-    rows = {
-        "versions": ", ".join(f"{k} {v}" for k, v in config["versions"].items()),
-        "Python": config["python"],
-        "system": config["platform"],
-        "CPU": f"{config['cpu']} ({config['cores']} cores)",
-        "wall time": f"{config['wall_time_s']:g} s" if config.get("finished") else "not finished",
-    }
+def _provenance(provenance: Any) -> str:
+    rows = {}
+    for run in provenance["runs"]:
+        rows = {
+            "versions": ", ".join(f"{k} {v}" for k, v in run["versions"].items()),
+            "Python": run["python"],
+            "system": run["platform"],
+            "CPU": f"{run['cpu']} ({run['cores']} cores)",
+            "wall time": f"{run.get('wall_time_s', float('nan')):g} s",
+        }
     cells = "".join(
         f"<tr><th>{html.escape(k)}</th><td style='text-align:left'>{html.escape(str(v))}</td></tr>"
         for k, v in rows.items()

@@ -76,6 +76,8 @@ LOOKS = {
     "ilc": Look("ILC", PALETTE["blue"], "-", "o"),
     "model+ilc": Look("ILC seeded by the model", PALETTE["green"], _DASHED, "D"),
     "ilc-paper": Look("ILC, the paper's law", PALETTE["vermilion"], _DASH_DOT, "v"),
+    "identified": Look("PD + identified model", PALETTE["grey"], _DASHED, "P"),
+    "identified+gait": Look("PD + identified model, gaits again", PALETTE["purple"], "-", "*"),
     "paper": Look("paper", PALETTE["purple"], "", "+"),
 }
 """Looks by controller, in the order of legends; "paper" are the paper's own numbers."""

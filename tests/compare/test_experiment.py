@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from pronk_pin._urdf import mujoco_spec
 from pronk_pin.compare import (
     DEFAULT_CONTROLLERS,
     Experiment,
@@ -20,6 +21,7 @@ from pronk_pin.compare.experiment import torque_library
 from pronk_pin.control import phase_grid
 from pronk_pin.errors import InvalidInput, PronkError
 from pronk_pin.gait import SPEEDS
+from pronk_pin.robot import Robot
 
 SHORT = Schedule(startup=0.1, practice=1.0, learning=0.5)
 
@@ -51,6 +53,29 @@ def test_each_cell_has_a_file_name_of_its_own() -> None:
     assert "model+ilc_payload_1" in names
 
 
+def test_scenarios_are_known_by_one_spelling() -> None:
+    experiment = Experiment(scenarios=("nominal+slope+payload=3", "ideal"))
+    assert experiment.scenarios == ("payload+slope", "ideal")
+
+
+def test_the_same_robot_from_an_mjcf_makes_the_same_strides(robot: Robot, tmp_path: Path) -> None:
+    """But for the six digits of the file."""
+    spec = mujoco_spec(robot)
+    spec.compile()
+    path = tmp_path / "robot.xml"
+    path.write_text(spec.to_xml())
+    settings: dict[str, Any] = {"speeds": (0.3,), "controllers": ("pd",), "schedule": SHORT}
+    own, other = (
+        run_cell(Experiment(**settings, world=world).cells()[0]) for world in ("", str(path))
+    )
+    assert other.attrs["world"] == str(path)
+    assert len(other.attrs["world_sha256"]) == 64
+    first = {"stride": slice(0, 2)}
+    np.testing.assert_allclose(
+        other["peak_error"].isel(first), own["peak_error"].isel(first), atol=2e-4
+    )
+
+
 def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
     mixed: dict[str, Any] = {"speeds": [0.3, -0.1], "controllers": ["pd"], "seeds": [3]}
     ordered = Experiment(speeds=(-0.1, 0.3), controllers=("pd",), seeds=(3,))
@@ -64,12 +89,11 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
         (
             {"controllers": ("pd", "lqr")},
             "unknown controller 'lqr'; choose one of: "
-            "pd, ilc, model, library, model+ilc, ilc-paper",
+            "pd, ilc, model, library, model+ilc, ilc-stance",
         ),
         (
             {"scenarios": ("moon",)},
-            "unknown scenario 'moon'; choose one of: "
-            "ideal, nominal, payload, weak-motors, soft-ground",
+            "unknown scenario 'moon'; choose one of: ideal, nominal, payload, ",
         ),
         (
             {"speeds": (0.0, 0.9)},
@@ -77,6 +101,11 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
             "speed in that range, or extend the library with 'pronk-pin gaits build'",
         ),
         ({"speeds": (0.1, 0.1)}, "speeds must name at least one, and none of them twice"),
+        (
+            {"scenarios": ("payload+slope", "slope+payload")},
+            "scenarios must name at least one, and none of them twice",
+        ),
+        ({"world": "nowhere.xml"}, "nowhere.xml: MuJoCo cannot load it"),
         ({"speeds": ()}, "speeds must name at least one, and none of them twice"),
         ({"controllers": ("pd", "pd")}, "controllers must name at least one, and none of them"),
         ({"seeds": (0, -1)}, "seeds must not be negative"),
@@ -127,7 +156,8 @@ def test_the_library_is_the_mean_of_what_was_learned_in_the_end(comparison: Resu
     )
     np.testing.assert_allclose(library.torque[:, :, ::4], mean, atol=1e-4)
     between = 0.5 * (library.torque[:, :, :-1:4] + library.torque[:, :, 4::4])
-    np.testing.assert_allclose(library.torque[:, :, 2::4], between, atol=1e-4)
+    bend = np.abs(library.torque[:, :, 2::4] - between)
+    assert 0.0 < bend.max() < 0.5  # smooth between the samples, not straight
 
 
 def test_the_library_repeats_what_was_learned(comparison: Results) -> None:

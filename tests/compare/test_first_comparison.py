@@ -38,21 +38,26 @@ def test_pd_alone_misses_as_much_as_the_papers(summary: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("joint", ["calf", "thigh"])
-def test_learning_takes_away_three_quarters_of_the_mean_peak(
-    summary: pd.DataFrame, joint: str
+@pytest.mark.parametrize(("metric", "share"), [("peak_error", 0.92), ("rms_error", 0.94)])
+def test_learning_takes_away_nine_tenths_of_the_error(
+    summary: pd.DataFrame, joint: str, metric: str, share: float
 ) -> None:
-    before, after = (values(summary, "peak_error", name, joint) for name in ("pd", "ilc"))
-    assert 1.0 - after.mean() / before.mean() >= 0.75
+    before, after = (values(summary, metric, name, joint) for name in ("pd", "ilc"))
+    assert 1.0 - after.mean() / before.mean() >= share
 
 
 @pytest.mark.parametrize("joint", ["calf", "thigh"])
 def test_no_speed_is_worse_for_learning(summary: pd.DataFrame, joint: str) -> None:
     reduced = reduction(summary, "peak_error")
-    assert np.all(values(reduced, "peak_error", "ilc", joint) > 0.0)
+    assert np.all(values(reduced, "peak_error", "ilc", joint) > 0.85)
 
 
-def test_learning_has_settled_within_17_strides_at_every_speed(summary: pd.DataFrame) -> None:
-    assert np.all(values(summary, "strides_to_converge", "ilc") <= 17.0)
+def test_learning_has_settled_within_15_strides_at_every_speed(summary: pd.DataFrame) -> None:
+    assert np.all(values(summary, "strides_to_converge", "ilc") <= 15.0)
+
+
+def test_the_apex_stays_within_half_a_millimetre(summary: pd.DataFrame) -> None:
+    assert np.all(values(summary, "apex_deviation", "ilc") < 5e-4)
 
 
 @pytest.mark.parametrize("joint", ["calf", "thigh"])

@@ -11,7 +11,6 @@ import pytest
 
 from pronk_pin._typing import Array
 from pronk_pin.compare import Scenario, World, build_model, load_scenario
-from pronk_pin.compare.simulate import TOUCHDOWN_LOAD
 from pronk_pin.compare.world import finite, without_warnings
 from pronk_pin.control import Gains, load_controller
 from pronk_pin.conventions import to_mujoco
@@ -23,12 +22,15 @@ from pronk_pin.robot import ROBOTS, Robot, load_robot
 IDEAL = load_scenario("ideal")
 LOADED = replace(IDEAL, name="loaded", payload=3.0, payload_position=(0.1, -0.03, 0.08))
 HIGH = replace(LOADED, name="high", payload_position=(-0.02, 0.02, 0.5))  # turns the axes over
+SHIFTED = replace(LOADED, name="shifted", com_shift=(0.03, 0.01, -0.02))
 GUIDED = [0, 2, *range(6, 18)]  # what the locked base leaves free
 
 
 def loaded_model(robot: Robot, scenario: Scenario) -> pin.Model:
-    """Pinocchio's model with the payload as a point mass on the trunk."""
+    """Pinocchio's model, trunk shifted, with the payload as a point mass on the trunk."""
     model = robot.model.copy()
+    trunk = model.inertias[model.getJointId("root_joint")]
+    trunk.lever = trunk.lever + np.array(scenario.com_shift)
     point = pin.Inertia(scenario.payload, np.zeros(3), np.zeros((3, 3)))
     place = pin.SE3(np.eye(3), np.array(scenario.payload_position))
     model.appendBodyToJoint(model.getJointId("root_joint"), point, place)
@@ -52,13 +54,16 @@ def stand(robot: Robot, world: World, joints: Array, seconds: float) -> None:
         world.step(feedback - gains.derivative * world.joint_rates)
 
 
-@pytest.mark.parametrize("scenario", [IDEAL, LOADED, HIGH], ids=lambda scenario: scenario.name)
+@pytest.mark.parametrize(
+    "scenario", [IDEAL, LOADED, HIGH, SHIFTED], ids=lambda scenario: scenario.name
+)
 def test_mass_and_centre_of_mass_are_the_urdfs_and_the_payloads(
     robot: Robot, scenario: Scenario
 ) -> None:
     model = build_model(robot, scenario, free=True)
     data = data_at(robot, model, robot.standing)
     own = pin.centerOfMass(robot.model, robot.model.createData(), robot.standing)
+    own = own + robot.model.inertias[1].mass / robot.mass * np.array(scenario.com_shift)
     place = robot.standing[:3] + np.array(scenario.payload_position)
 
     total = robot.mass + scenario.payload
@@ -67,7 +72,9 @@ def test_mass_and_centre_of_mass_are_the_urdfs_and_the_payloads(
     np.testing.assert_allclose(data.subtree_com[0], centre, atol=1e-9)
 
 
-@pytest.mark.parametrize("scenario", [IDEAL, LOADED, HIGH], ids=lambda scenario: scenario.name)
+@pytest.mark.parametrize(
+    "scenario", [IDEAL, LOADED, HIGH, SHIFTED], ids=lambda scenario: scenario.name
+)
 def test_the_mass_matrix_is_pinocchios_with_the_payload(robot: Robot, scenario: Scenario) -> None:
     model, reference = build_model(robot, scenario, free=True), loaded_model(robot, scenario)
     rng = np.random.default_rng(3)
@@ -181,6 +188,54 @@ def test_a_softer_ground_gives_way_more(robot: Robot) -> None:
     assert heights[0] == pytest.approx(robot.foot_radius, abs=1e-3)
 
 
+@pytest.mark.parametrize("name", ROBOTS)
+def test_rotor_and_friction_come_on_top_of_the_robots_own(name: str) -> None:
+    robot = load_robot(name)
+    added = replace(IDEAL, armature=0.02, damping=0.3, coulomb=0.4)
+    model = build_model(robot, added, free=True)
+    dofs = [model.joint(joint).dofadr[0] for joint in robot.joint_names]
+    own = robot.model
+    np.testing.assert_allclose(model.dof_armature[dofs], own.armature[6:] + 0.02)
+    np.testing.assert_allclose(model.dof_damping[dofs], own.damping[6:] + 0.3)
+    np.testing.assert_allclose(model.dof_frictionloss[dofs], own.friction[6:] + 0.4)
+
+
+def test_viscous_friction_slows_the_joints_as_pinocchio_says(robot: Robot) -> None:
+    """In the air; MuJoCo's Euler takes the damping at the end of the step."""
+    damping, dt = 0.5, IDEAL.timestep
+    world = World(robot, replace(IDEAL, damping=damping), 1)
+    rates = 3.0 * np.random.default_rng(1).normal(size=(1, 12))
+    world.reset(np.array([[0.0, 1.0]]), robot.standing[None, 7:], joint_rates=rates)
+    before = np.hstack([world.base_rate, world.joint_rates])[0]
+    world.step(np.zeros((1, 12)))
+
+    v = np.zeros(18)
+    v[GUIDED] = before
+    friction = np.diag([0.0, 0.0, *[damping] * 12])
+    force = -nonlinear_effects(robot, robot.standing, v)[GUIDED] - friction @ before
+    mass = mass_matrix(robot, robot.standing)[np.ix_(GUIDED, GUIDED)]
+    expected = np.linalg.solve(mass + dt * friction, force)
+    measured = (np.hstack([world.base_rate, world.joint_rates])[0] - before) / dt
+    np.testing.assert_allclose(measured, expected, rtol=1e-6, atol=1e-6)
+
+
+def test_coulomb_friction_takes_its_torque_from_a_moving_joint(robot: Robot) -> None:
+    """Each calf alone is driven against it; in the air, in motion."""
+    coulomb, torque = 0.6, 3.0
+    worlds = [World(robot, replace(IDEAL, coulomb=value), 1) for value in (coulomb, 0.0)]
+    tau = np.zeros((1, 12))
+    tau[0, 2::3] = torque
+    for world, driven in zip(worlds, (tau, tau - coulomb * (tau > 0.0)), strict=True):
+        rates = np.where(tau > 0.0, 2.0, 0.0)
+        world.reset(np.array([[0.0, 1.0]]), robot.standing[None, 7:], joint_rates=rates)
+        for _ in range(20):
+            others = 400.0 * (robot.standing[7:] - world.joints) - 4.0 * world.joint_rates
+            world.step(np.where(tau > 0.0, driven, others))
+    with_friction, without = (world.joint_rates[0, 2::3] for world in worlds)
+    np.testing.assert_allclose(with_friction, without, rtol=0.01)
+    assert with_friction.min() > 5.0
+
+
 def test_coulomb_friction_holds_a_joint_that_would_move_without_it(robot: Robot) -> None:
     moved = []
     for coulomb in (0.0, 0.2):
@@ -245,7 +300,8 @@ def test_a_touchdown_is_felt_within_the_ticks_that_the_controller_reckons_with(
         clearance.append(feet[..., 2].min(axis=1) - robot.foot_radius)
         load.append(world.force[..., 2].sum(axis=1))
         world.step(Gains().proportional * (standing - world.joints))
-    felt = np.argmax(np.array(load) > TOUCHDOWN_LOAD * robot.mass * robot.gravity, axis=0)
+    threshold = load_controller("pd").contact.touchdown * robot.mass * robot.gravity
+    felt = np.argmax(np.array(load) > threshold, axis=0)
     for height, tick in zip(np.array(clearance).T, felt, strict=True):
         below = int(np.argmax(height < 0.0))
         contact = below - height[below] / (height[below] - height[below - 1])
