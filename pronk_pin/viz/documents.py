@@ -76,6 +76,7 @@ def film_blob(scene: Scene, *, fps: float = FPS) -> bytes:
             "view": scene.view(times),
             "friction": scene.friction,
             "forceScale": scene.force_scale,
+            "forceWindow": scene.force_window,
             "errorScale": _end(scene, rows, "error", _ERROR_STEPS),
             "useScale": _end(scene, rows, "torque", _USE_STEPS),
             "tracks": [_track(track, row) for track, row in zip(scene.tracks, rows, strict=True)],

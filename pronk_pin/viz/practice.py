@@ -25,6 +25,9 @@ BEFORE, AFTER = 3, 9
 WINDOW = BEFORE + AFTER
 """Strides that are shown together."""
 
+FORCE_WINDOW = 1.0 / 60.0
+"""Time over which forces are averaged [s]: a frame of the page."""
+
 ASIDE = 0.55
 """Distance of a second robot from the first [m]."""
 
@@ -122,6 +125,7 @@ class _Reader:
         return Scene(
             robot,
             tracks,
+            force_window=FORCE_WINDOW,
             title=f"{robot.name.upper()} pronking at {speed:g} m/s",
             caption=f"scenario {scenario}, strides {choice[STRIDES]}{note}",
             friction=load_scenario(scenario).ground_friction,
@@ -234,20 +238,33 @@ class _Samples:
         return np.asarray(values[self.within], dtype=float)
 
     def forces(self, strides: xr.Dataset) -> Array | None:
-        """Forces of the ground at all samples [N], shape (m, 4, 3), NaN where not known.
+        """Forces of the ground [N], shape (m, 4, 3), each the mean over `FORCE_WINDOW` before.
 
-        They are kept for the last strides only, tick by tick; None if these are others.
+        They are kept for the last strides only, tick by tick: NaN elsewhere, None if these are all
+        others. A touchdown is one tick of thousands of newtons; a mean keeps its impulse, where a
+        sample would miss it.
         """
-        kept = strides["tick_force"].transpose("last", "part", "tick", "foot", ...).to_numpy()
-        last = strides["stride"].to_numpy() - (int(strides["count"]) - len(kept))
-        found = np.full((*self.since.shape, *kept.shape[3:]), np.nan)
-        ticks = np.rint(self.since / float(strides.attrs["timestep"])).astype(np.intp)
-        ticks = np.minimum(ticks, kept.shape[2] - 1)  # (strides, 2, samples)
-        for k in np.flatnonzero(last >= 0):
-            for part in range(found.shape[1]):
-                found[k, part] = kept[last[k], part, ticks[k, part]]
-        forces = found[self.within]
-        return None if np.all(np.isnan(forces)) else np.asarray(forces)
+        last = strides["stride"].to_numpy() - (int(strides["count"]) - strides.sizes["last"])
+        shown = np.flatnonzero(last >= 0)
+        if not shown.size:
+            return None
+        kept = strides["tick_force"].isel(last=last[shown])
+        ticks = kept.transpose("last", "part", "tick", "foot", ...).to_numpy()
+        ticks = ticks[np.isfinite(ticks).all(axis=(-2, -1))]  # (ticks, 4, 3), one after the other
+        timestep = float(strides.attrs["timestep"])
+        impulse = np.concatenate([np.zeros((1, 12)), np.cumsum(ticks.reshape(-1, 12), axis=0)])
+        impulse *= timestep
+        begin = float(self.begin[shown[0], 0, 0])
+        clock = begin + timestep * np.arange(len(impulse))
+        times = self.times
+        before = np.maximum(times - FORCE_WINDOW, begin)
+        given = [
+            np.interp(times, clock, column) - np.interp(before, clock, column)
+            for column in impulse.T
+        ]
+        span = np.maximum(times - before, timestep)
+        forces = np.where(times < begin, np.nan, np.array(given) / span).T
+        return np.asarray(forces.reshape(len(times), 4, 3))
 
 
 def _order(curve: xr.DataArray) -> list[str]:

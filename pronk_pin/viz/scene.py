@@ -161,6 +161,7 @@ class Scene:
         caption: A line below the heading.
         friction: Friction coefficient of the ground, for the cones; None without cones.
         force_scale: Length of a force arrow [m/N].
+        force_window: Time over which the forces are means [s], for the legend; 0 if they are not.
     """
 
     robot: Robot
@@ -169,6 +170,7 @@ class Scene:
     caption: str = ""
     friction: float | None = None
     force_scale: float = 0.0025
+    force_window: float = 0.0
 
     def __post_init__(self) -> None:
         names = [track.name for track in self.tracks]

@@ -485,7 +485,9 @@ class Player {
     }
     if (this.film.tracks.some((track) => track.channels.includes("forces"))) {
       const newtons = Math.round(0.1 / this.film.forceScale);
-      items.push(entry("#d55e00", "", `ground reaction force, 0.1 m for ${newtons} N`));
+      const mean = this.film.forceWindow
+        ? `, mean over ${Math.round(1000 * this.film.forceWindow)} ms` : "";
+      items.push(entry("#d55e00", "", `ground reaction force, 0.1 m for ${newtons} N${mean}`));
     }
     $("tracks").replaceChildren(...items);
     this.drawScale();
