@@ -46,11 +46,11 @@ from .gait import (
 from .model_files import write_mjcf, write_urdf
 from .parity import compare_models
 from .robot import load_robot
-from .viz import Scene, gait_scene, serve, write_replay
+from .viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
 from .viz.explanation_figure import write_explanation_figure
 from .viz.gait_figures import write_gait_figures
 from .viz.learning_figures import write_prediction
-from .viz.practice import practice_scene
+from .viz.practice import practice_programme
 from .viz.report import write_figures, write_report
 
 
@@ -167,45 +167,83 @@ class Explain:
 
 @dataclass(frozen=True)
 class View:
-    """Show a motion in a live MeshCat page: the robot beside its reference, or a gait."""
+    """Show a motion: a result's robots beside their references, or a library's gaits.
+
+    Without --html, --png, --gif or --mp4, on a live page with controls.
+    """
 
     what: Positional[Path | None] = None
     """Results folder or gait library; by default the shipped gaits."""
     speed: float | None = None
     """Which speed [m/s]; by default the one nearest to 0.5."""
+    apex: float | None = None
+    """Which apex of a gait library [m]; by default the library's own."""
     controller: str | None = None
     """Which controller of a result; by default ilc."""
     scenario: str | None = None
     """Which scenario of a result; by default the first."""
+    beside: str | None = None
+    """What to show beside it: another controller of the result, or 'before learning'."""
+    stride: int | None = None
+    """Show the dozen strides of a result with this one; by default those around the start of
+    learning."""
     robot: str = "a1"
     """Robot whose shipped gaits are shown."""
+    gait: str = "pronk"
+    """Which of its shipped gaits: pronk or bound."""
+    base: str | None = None
+    """How the trunk may move in it, locked or sagittal; by default the gait's own."""
     port: int | None = None
     """Port of the page; by default a free one."""
+    host: str = "127.0.0.1"
+    """Address that the page listens on; the default can be reached from this machine only."""
     open: bool = True
     """Open the page in the browser."""
-    html: Path | None = None
-    """Write the motion to this file instead: it opens offline."""
     duration: float | None = None
-    """End after so many seconds; by default on Ctrl-C."""
+    """End the page after so many seconds; by default on Ctrl-C."""
+    html: Path | None = None
+    """Write the page to this file instead: it opens offline."""
+    png: Path | None = None
+    """Write a picture to this file instead."""
+    gif: Path | None = None
+    """Write an animation to this file instead."""
+    mp4: Path | None = None
+    """Write a video to this file instead."""
+    film: Annotated[Film, arg(name="")] = field(default_factory=Film)
+    """What pictures and films are like."""
 
     def run(self) -> None:
         """Do it."""
-        scene = self._scene()
+        programme = self._programme()
         if self.html is not None:
-            print(f"replay  {write_replay(scene, self.html)}")
-            return
-        serve(scene, port=self.port, open_browser=self.open, duration=self.duration)
+            print(f"replay  {write_replay(programme, self.html)}")
+        if self.png is not None:
+            print(f"picture {write_png(programme.scene(), self.png, self.film)}")
+        for path in (self.gif, self.mp4):
+            if path is not None:
+                print(f"film    {write_film(programme.scene(), path, self.film)}")
+        if all(path is None for path in (self.html, self.png, self.gif, self.mp4)):
+            serve(
+                programme,
+                port=self.port,
+                host=self.host,
+                open_browser=self.open,
+                duration=self.duration,
+            )
 
-    def _scene(self) -> Scene:
+    def _programme(self) -> Programme:
         if self.what is not None and self.what.is_dir():
-            return practice_scene(
+            return practice_programme(
                 Results.load(self.what),
                 speed=self.speed,
                 controller=self.controller,
                 scenario=self.scenario,
+                beside=self.beside,
+                stride=self.stride,
             )
-        library = _library(self.what, self.robot)
-        return gait_scene(load_robot(library.robot), library.at(_default_speed(self.speed)))
+        return library_programme(
+            _library(self.what, self.robot, self.gait, self.base), speed=self.speed, apex=self.apex
+        )
 
 
 @dataclass(frozen=True)
@@ -270,11 +308,7 @@ class _OfLibrary:
 
     def load(self) -> GaitLibrary:
         """The library, even one that failed its audit."""
-        if self.library is not None:
-            return GaitLibrary.load(self.library, audited=False)
-        load_robot(self.robot)
-        base = None if self.base is None else known_base(self.base)
-        return load_library(self.robot, gait=self.gait, base=base)
+        return _library(self.library, self.robot, self.gait, self.base, audited=False)
 
 
 @dataclass(frozen=True)
@@ -551,18 +585,17 @@ def _write_pages(results: Results) -> None:
     """The report and the replay of a result, with their names printed."""
     print(f"\nresults  {results.folder}")
     print(f"report   {write_report(results)}")
-    print(f"replay   {write_replay(practice_scene(results), results.folder / 'replay.html')}")
+    print(f"replay   {write_replay(practice_programme(results), results.folder / 'replay.html')}")
 
 
-def _library(path: Path | None, robot: str) -> GaitLibrary:
-    if path is None:
-        load_robot(robot)
-        return load_library(robot)
-    return GaitLibrary.load(path)
-
-
-def _default_speed(speed: float | None) -> float:
-    return 0.5 if speed is None else speed
+def _library(
+    path: Path | None, robot: str, gait: str, base: str | None, *, audited: bool = True
+) -> GaitLibrary:
+    """A library from a file, or one that is shipped."""
+    if path is not None:
+        return GaitLibrary.load(path, audited=audited)
+    load_robot(robot)
+    return load_library(robot, gait=gait, base=None if base is None else known_base(base))
 
 
 if __name__ == "__main__":

@@ -204,3 +204,19 @@ class PortUnavailable(PronkError):
 
 class LeakyFilter(UserWarning):
     """A learning filter whose DC gain is not 1: it loses, or adds, torque in each stride."""
+
+
+class NoBrowser(PronkError):
+    """There is no browser to draw pictures and films with, or it does not do it.
+
+    Attributes:
+        reason: What is wrong.
+    """
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(
+            f"pictures and films are drawn by Chromium or Chrome without a window, and {reason}; "
+            "install one ('apt install chromium'), or name its program in the environment variable "
+            "PRONK_PIN_BROWSER; pages (--html) need none here"
+        )

@@ -81,8 +81,9 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
 def _over_time(axes: Axes, mine: xr.Dataset, joint: str, shown: IntArray, switch: int) -> None:
     """Measured and planned angle of a joint in the stances of some strides."""
     measured, planned = _joint_curves(mine, joint)
+    since = mine["phase"].to_numpy() * float(mine["planned_duration"].sel(part="stance"))
     for k in shown:
-        t = mine["start"].to_numpy()[k] + mine["phase"].to_numpy() * float(mine["stance"][k])
+        t = mine["start"].to_numpy()[k] + since
         axes.plot(t, planned, "--", color=REFERENCE, lw=0.8)
         axes.plot(t, measured[k], color=look("ilc" if k >= switch else "pd").color)
 

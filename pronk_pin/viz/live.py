@@ -1,62 +1,87 @@
-"""A scene on a live page: a small web server of our own around MeshCat's viewer.
+"""A page of this process: a small web server of our own around MeshCat's viewer.
 
 MeshCat's Python server listens on every network interface, is a process of its own that can be
 left behind, and reads nothing from the page. Its viewer only needs a page and a websocket, and
 tornado, which comes with MeshCat, gives both: on a thread of this process, which ends with it.
+
+The page asks for the film of what it is to show, and plays it by the clock of its own machine:
+each page is paused and scrubbed for itself, and is in real time however busy this process is. A
+loop that has no film yet, because it is computing it, sends instants instead.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import socket
 import threading
-import time
 import webbrowser
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from string import Template
 from types import TracebackType
+from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import tornado.httpserver
 import tornado.netutil
 import tornado.web
 import tornado.websocket
 
-from ..errors import InvalidInput, PortUnavailable
-from . import drawing
-from .scene import Scene
+from .._state import as_array, as_q
+from ..errors import InvalidInput, PortUnavailable, PronkError
+from .documents import film_blob, robot_blob, row_bytes, stream_row
+from .page import page, player_source, viewer_source
+from .programme import Programme
+from .scene import CHANNELS, Scene
 
 PORTS = range(7000, 7100)
 """Ports that are tried when none is asked for; MeshCat's own range."""
 
-RATE = 60.0
-"""Frames sent per second [1/s]."""
-
 _START = """\
 <script src="viewer.js"></script>
+<script src="player.js"></script>
 <script>
-  const viewer = createViewer();
-  viewer.connect(`ws://${location.host}/stream`);
-  viewer.connection.onclose = () => {
-    document.getElementById("state").textContent = "The program behind this page has ended.";
-  };
+  const words = document.getElementById("state");
+  async function fetchBytes(path) {
+    const answer = await fetch(path).catch(() => { throw new Error("The program has ended."); });
+    if (!answer.ok) throw new Error(await answer.text());
+    return answer.arrayBuffer();
+  }
+  let player;
+  function listen() {
+    const socket = new WebSocket(`$${location.protocol === "https:" ? "wss" : "ws"}://` +
+                                 `$${location.host}$${location.pathname}stream`);
+    socket.binaryType = "arraybuffer";
+    socket.onmessage = (event) => player.stream(event.data);
+    socket.onclose = () => {
+      words.textContent = "The program behind this page has ended.";
+      setTimeout(() => fetch("").then(() => location.reload()).catch(() => {}), 2000);
+    };
+  }
+  fetchBytes("robot").then((robot) => Player.start({
+    robot, options: $options, first: $first,
+    film: (choice) => fetchBytes("film?" + new URLSearchParams(choice)),
+  })).then((started) => { player = started; listen(); })
+    .catch((error) => { words.textContent = error.message; });
 </script>
 """
 
 
 def serve(
-    scene: Scene,
+    shown: Scene | Programme,
     *,
     port: int | None = None,
     host: str = "127.0.0.1",
     open_browser: bool = True,
     duration: float | None = None,
 ) -> str:
-    """Play a scene on a live page, over and over, until Ctrl-C; its address is printed.
-
-    The page keeps to the wall clock: what comes too late is left out, nothing is slowed down.
+    """Show a scene, or several to choose from, on a live page until Ctrl-C; its address is printed.
 
     Args:
-        scene: What to show.
+        shown: What to show.
         port: Port of the page; without it a free one is found.
         host: Address to listen on; the default can be reached from this machine only.
         open_browser: Open the page in the default browser.
@@ -69,37 +94,45 @@ def serve(
         PortUnavailable: The port is in use or forbidden.
         InvalidInput: There is no such port.
     """
-    with LiveServer(scene, port=port, host=host) as server:
+    with LiveServer(shown, port=port, host=host) as server:
         ends = "Ctrl-C ends it" if duration is None else f"for {duration:g} s"
         with contextlib.suppress(KeyboardInterrupt):
-            print(f"{scene.title or 'Scene'} plays at {server.url} ({ends})", flush=True)
+            print(f"{server.scene.title or 'The scene'} is at {server.url} ({ends})", flush=True)
             if open_browser:
                 webbrowser.open(server.url)
-            server.play(duration)
+            threading.Event().wait(duration)
     return server.url
 
 
 class LiveServer:
-    """The page of a scene, served from a thread; a context manager.
+    """A page that is served from a thread, until `close` or the end of the process.
 
-    Any number of pages may be open, and come and go.
+    Any number of pages may be open, and come and go. A context manager; in a notebook its value
+    shows the page.
 
     Attributes:
-        scene: What is shown.
+        programme: What can be shown.
+        scene: What is shown first, and what `display` moves.
         url: Address of the page.
     """
 
-    def __init__(self, scene: Scene, *, port: int | None = None, host: str = "127.0.0.1") -> None:
-        self.scene = scene
-        self._setup = drawing.setup_messages(scene)
+    def __init__(
+        self, shown: Scene | Programme, *, port: int | None = None, host: str = "127.0.0.1"
+    ) -> None:
+        self.programme = Programme.of(shown)
+        self.scene = self.programme.scene()
+        self._robot = robot_blob(self.scene)
         self._sockets = _bind(host, port)
         self.url = f"http://{host}:{self._sockets[0].getsockname()[1]}/"
         self._pages: set[_Stream] = set()
+        self._last: bytes | None = None
+        self._view = self.scene.view(np.array([self.scene.start]))[0]
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="pronk_pin films")
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._run, name="pronk_pin live page", daemon=True)
+        self._thread.start()
 
     def __enter__(self) -> LiveServer:
-        self._thread.start()
         return self
 
     def __exit__(
@@ -108,41 +141,70 @@ class LiveServer:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._loop.call_soon_threadsafe(self._loop.stop)
-        self._thread.join()
+        self.close()
+
+    def _repr_html_(self) -> str:
+        return f'<iframe src="{self.url}" style="width:100%;height:520px;border:0"></iframe>'
+
+    def close(self) -> None:
+        """End it; nothing is left behind. Once is enough, and again does no harm."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+            self._worker.shutdown()
 
     @property
     def pages(self) -> int:
         """How many pages are open."""
         return len(self._pages)
 
-    def play(self, duration: float | None = None) -> None:
-        """Play the scene over and over, for a time [s] or for ever, at the rate of the wall clock.
+    def display(self, *q: npt.ArrayLike, **channels: Sequence[npt.ArrayLike]) -> None:
+        """Show an instant on all open pages, and return at once: for loops that make the motion.
 
-        The open pages get the frame that is due now; a page that is still busy with an earlier one
-        goes without.
+        What comes while a page is still busy with the instant before is left out there, except
+        the last.
+
+        Args:
+            q: A configuration for each track of the scene, each of shape (19,).
+            channels: For each channel that a track has, values for each track that has it:
+                `forces` [N], shape (4, 3), `error` [rad] and `torque` [N m], shape (12,).
+
+        Raises:
+            InvalidInput: A wrong number of configurations or channels, or a wrong shape.
         """
-        times = self.scene.times(RATE)
-        frames: dict[int, list[bytes]] = {}
-        begin = time.monotonic()
-        tick = 0
-        while duration is None or tick < duration * RATE:
-            k = tick % len(times)
-            if self._pages:
-                if k not in frames:
-                    frames[k] = drawing.frame_messages(self.scene, float(times[k]))
-                self.send(frames[k])
-            elapsed = time.monotonic() - begin
-            tick = max(int(elapsed * RATE), tick) + 1
-            time.sleep(tick / RATE - elapsed)
+        robot, tracks = self.scene.robot, self.scene.tracks
+        if len(q) != len(tracks):
+            raise InvalidInput(f"{len(q)} configurations for {len(tracks)} tracks; give one each")
+        rows: list[dict[str, npt.NDArray[np.float64]]] = []
+        given = {key: iter(values) for key, values in channels.items()}
+        if unknown := set(given) - set(CHANNELS):
+            raise InvalidInput(f"no channel {', '.join(unknown)}; there are {', '.join(CHANNELS)}")
+        for track, one in zip(tracks, q, strict=True):
+            place = as_q(robot, one).reshape(1, -1)
+            row = {"q": place, "feet": self.scene.appearance.feet(place).reshape(1, -1)}
+            for key in track.channels:
+                values = next(given.get(key, iter(())), None)
+                if values is None:
+                    raise InvalidInput(f"track '{track.name}' shows {key}; give {key}=[...]")
+                size = getattr(track, key).reshape(len(track.t), -1).shape[1]
+                row[key] = as_array(key, np.ravel(values), size, ())[None]
+            rows.append(row)
+        leader = next(i for i, track in enumerate(tracks) if track is self.scene.leader)
+        self._view += 0.1 * (rows[leader]["q"][0, :2] - self._view)
+        self.send(row_bytes(self.scene, rows, self._view))
 
-    def send(self, messages: Sequence[bytes]) -> None:
-        """Hand messages (see `drawing`) to the open pages, and return at once."""
-        self._loop.call_soon_threadsafe(self._broadcast, messages)
+    def seek(self, time: float) -> None:
+        """Have all open pages show an instant of the first scene [s], and stop there."""
+        self.send(stream_row(self.scene, time))
 
-    def _broadcast(self, messages: Sequence[bytes]) -> None:
-        for page in self._pages:
-            page.offer(messages)
+    def send(self, row: bytes) -> None:
+        """Hand an instant (see `documents.row_bytes`) to the open pages, and return at once."""
+        self._last = row
+        self._loop.call_soon_threadsafe(self._broadcast, row)
+
+    def _broadcast(self, row: bytes) -> None:
+        for open_page in self._pages:
+            open_page.offer(row)
 
     def _run(self) -> None:
         """The thread: serve until the loop is stopped, then leave nothing open."""
@@ -151,8 +213,8 @@ class LiveServer:
         server.add_sockets(self._sockets)
         self._loop.run_forever()
         server.stop()
-        for page in tuple(self._pages):
-            page.close()
+        for open_page in tuple(self._pages):
+            open_page.close()
         self._loop.run_until_complete(server.close_all_connections())
         tasks = asyncio.all_tasks(self._loop)
         for task in tasks:
@@ -161,56 +223,103 @@ class LiveServer:
         self._loop.close()
 
     def _application(self) -> tornado.web.Application:
-        viewer = {"text": drawing.viewer_source(), "kind": "text/javascript"}
-        return tornado.web.Application(
-            [
-                ("/", _Text, {"text": drawing.page(self.scene, _START), "kind": "text/html"}),
-                ("/viewer.js", _Text, viewer),
-                ("/stream", _Stream, {"pages": self._pages, "setup": self._setup}),
-            ],
-            log_function=lambda handler: None,
+        options = {name: list(values) for name, values in self.programme.options.items()}
+        start = Template(_START).substitute(
+            options=_json(options), first=_json(dict(self.programme.first))
         )
+        script = "text/javascript; charset=utf-8"
+        served: list[tuple[str, type[tornado.web.RequestHandler], dict[str, Any]]] = [
+            ("/", _Bytes, _text(page(self.scene.title, start), "text/html; charset=utf-8")),
+            ("/viewer.js", _Bytes, _text(viewer_source(), script)),
+            ("/player.js", _Bytes, _text(player_source(), script)),
+            ("/robot", _Bytes, {"data": self._robot, "kind": "application/octet-stream"}),
+            ("/film", _Film, {"server": self}),
+            ("/stream", _Stream, {"pages": self._pages, "server": self}),
+        ]
+        return tornado.web.Application(served, log_function=lambda handler: None)
+
+    async def film(self, choice: dict[str, str]) -> bytes:
+        """The film of a choice; films are made one after the other, aside from the pages."""
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._worker, self._film, choice)
+
+    def _film(self, choice: dict[str, str]) -> bytes:
+        first = choice == dict(self.programme.first)
+        return film_blob(self.scene if first else self.programme.scene(choice))
 
 
-class _Text(tornado.web.RequestHandler):
-    """Answers with one text."""
+class _Bytes(tornado.web.RequestHandler):
+    """Answers with the same bytes each time."""
 
-    def initialize(self, text: str, kind: str) -> None:
-        self._text, self._kind = text, kind
+    def initialize(self, data: bytes, kind: str) -> None:
+        self._data, self._kind = data, kind
 
     def get(self) -> None:
-        self.set_header("Content-Type", f"{self._kind}; charset=utf-8")
+        self.set_header("Content-Type", self._kind)
         self.set_header("Cache-Control", "no-store")
-        self.write(self._text)
+        self.write(self._data)
+
+
+class _Film(tornado.web.RequestHandler):
+    """Answers with the film of a choice, or with what is wrong with it."""
+
+    def initialize(self, server: LiveServer) -> None:
+        self._server = server
+
+    async def get(self) -> None:
+        choice = {name: self.get_argument(name, "") for name in self.request.arguments}
+        self.set_header("Cache-Control", "no-store")
+        try:
+            data = await self._server.film(choice)
+        except PronkError as error:
+            self.set_status(400)
+            self.set_header("Content-Type", "text/plain; charset=utf-8")
+            self.write(str(error))
+            return
+        self.set_header("Content-Type", "application/octet-stream")
+        self.write(data)
 
 
 class _Stream(tornado.websocket.WebSocketHandler):
     """The connection to one open page; tornado refuses pages of other origins."""
 
-    def initialize(self, pages: set[_Stream], setup: Sequence[bytes]) -> None:
-        self._pages, self._setup = pages, setup
+    def initialize(self, pages: set[_Stream], server: LiveServer) -> None:
+        self._pages, self._server = pages, server
+        self._waiting: bytes | None = None
         self._sending: asyncio.Task[None] | None = None
 
     def open(self, *args: str, **kwargs: str) -> None:
         self.set_nodelay(True)
-        self.offer(self._setup)
         self._pages.add(self)
+        if self._server._last is not None:
+            self.offer(self._server._last)
 
     def on_message(self, message: str | bytes) -> None:
-        """The viewer has nothing to say."""
+        """The page has nothing to say here."""
 
     def on_close(self) -> None:
         self._pages.discard(self)
 
-    def offer(self, messages: Sequence[bytes]) -> None:
-        """Send messages, unless the page has not yet taken the previous ones."""
+    def offer(self, row: bytes) -> None:
+        """Send an instant; while the page has not taken the one before, only the last one waits."""
+        self._waiting = row
         if self._sending is None or self._sending.done():
-            self._sending = asyncio.ensure_future(self._send(messages))
+            self._sending = asyncio.ensure_future(self._send())
 
-    async def _send(self, messages: Sequence[bytes]) -> None:
+    async def _send(self) -> None:
         with contextlib.suppress(tornado.websocket.WebSocketClosedError):
-            for message in messages:
-                await self.write_message(message, binary=True)
+            while self._waiting is not None:
+                row, self._waiting = self._waiting, None
+                await self.write_message(row, binary=True)
+
+
+def _text(text: str, kind: str) -> dict[str, Any]:
+    return {"data": text.encode(), "kind": kind}
+
+
+def _json(value: object) -> str:
+    """JSON that may stand in a `<script>`."""
+    return json.dumps(value).replace("<", "\\u003c")
 
 
 def _bind(host: str, port: int | None) -> list[socket.socket]:

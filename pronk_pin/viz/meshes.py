@@ -7,7 +7,7 @@ process by clustering vertices; a page with two robots then fits into two megaby
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import coal
 import numpy as np
@@ -37,54 +37,70 @@ class Mesh:
     faces: IntArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Part:
     """One visual of the robot.
 
     Attributes:
         name: Name of Pinocchio's geometry object.
-        index: Its index in `Appearance.model`.
-        mesh: Its surface in its own frame.
+        joint: Number of the joint that moves it, in Pinocchio's order; 1 is the floating base.
+        placement: Its pose in the joint's frame, shape (4, 4).
+        mesh: Its surface in its own frame; parts of the same shape share one.
         color: Red, green and blue of the URDF, each in [0, 1].
     """
 
     name: str
-    index: int
+    joint: int
+    placement: Array
     mesh: Mesh
     color: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
+class Joint:
+    """A revolute joint of the kinematic tree.
+
+    Attributes:
+        name: Its name.
+        parent: Number of the joint that carries it, in Pinocchio's order; 1 is the floating base.
+        placement: Its pose in the parent's frame where its angle is 0, shape (4, 4).
+        axis: What it turns about, in its own frame, shape (3,).
+    """
+
+    name: str
+    parent: int
+    placement: Array
+    axis: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Appearance:
-    """The visuals of a robot, and where a configuration puts them.
+    """The visuals of a robot, and the tree of joints that moves them.
 
     Attributes:
         robot: The robot.
-        model: Pinocchio's visual geometry.
+        joints: The joints after the floating base; the number of the first is 2.
         parts: The visuals that are shown.
     """
 
     robot: Robot
-    model: pin.GeometryModel
+    joints: tuple[Joint, ...]
     parts: tuple[Part, ...]
 
-    def place(self, q: Array) -> tuple[Array, Array]:
-        """Forward kinematics of one configuration.
+    @cached_property
+    def tips(self) -> tuple[int, ...]:
+        """Number of the joint that carries each foot."""
+        return tuple(int(self.robot.model.frames[foot].parentJoint) for foot in self.robot.foot_ids)
 
-        Args:
-            q: Configuration, shape (19,).
-
-        Returns:
-            Poses of the parts in the world, shape (parts, 4, 4), and centres of the feet in the
-            world [m], shape (4, 3).
-        """
-        # Scratch memory of its own, for pages are drawn from threads; it takes 0.1 ms.
-        data, visuals = self.robot.model.createData(), self.model.createData()
-        pin.updateGeometryPlacements(self.robot.model, data, self.model, visuals, q)
-        pin.updateFramePlacements(self.robot.model, data)
-        poses = np.stack([visuals.oMg[part.index].homogeneous for part in self.parts])
-        feet = np.stack([data.oMf[foot].translation for foot in self.robot.foot_ids])
-        return poses, feet
+    def feet(self, q: Array) -> Array:
+        """Centres of the feet in the world [m], shape (n, 4, 3), of configurations (n, 19)."""
+        # Scratch memory of its own, for pages are drawn from threads.
+        model, data = self.robot.model, self.robot.model.createData()
+        found = np.empty((len(q), len(self.robot.legs), 3))
+        for row, one in enumerate(q):
+            pin.framesForwardKinematics(model, data, one)
+            found[row] = [data.oMf[foot].translation for foot in self.robot.foot_ids]
+        return found
 
 
 @lru_cache(maxsize=4)
@@ -93,7 +109,7 @@ def appearance(robot: Robot) -> Appearance:
 
     Raises:
         FileProblem: A mesh that the URDF names is missing or cannot be read.
-        InvalidInput: A visual is of a kind that cannot be shown.
+        InvalidInput: A visual or a joint is of a kind that cannot be shown.
     """
     try:
         model = pin.buildGeomFromUrdf(
@@ -109,12 +125,30 @@ def appearance(robot: Robot) -> Appearance:
         ) from error
     thinned: dict[tuple[str, tuple[float, ...]], Mesh] = {}
     parts = []
-    for index, item in enumerate(model.geometryObjects):
+    for item in model.geometryObjects:
         mesh = _surface(item, thinned)
         if np.ptp(mesh.vertices, axis=0).max() > SMALLEST:
             r, g, b = (float(c) for c in item.meshColor[:3])
-            parts.append(Part(item.name, index, mesh, (r, g, b)))
-    return Appearance(robot, model, tuple(parts))
+            placement = item.placement.homogeneous
+            parts.append(Part(item.name, int(item.parentJoint), placement, mesh, (r, g, b)))
+    return Appearance(robot, _joints(robot), tuple(parts))
+
+
+def _joints(robot: Robot) -> tuple[Joint, ...]:
+    """The tree of joints below the floating base."""
+    model, data = robot.model, robot.model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    found = []
+    for index in range(2, model.njoints):
+        motion = np.asarray(data.joints[index].S).reshape(6, -1)
+        if motion.shape[1] != 1 or np.any(motion[:3]):
+            raise InvalidInput(
+                f"joint {model.names[index]} of {robot.name} does not turn about one axis; "
+                "only revolute joints can be shown"
+            )
+        place = model.jointPlacements[index].homogeneous
+        found.append(Joint(model.names[index], int(model.parents[index]), place, motion[3:, 0]))
+    return tuple(found)
 
 
 def _surface(item: pin.GeometryObject, thinned: dict[tuple[str, tuple[float, ...]], Mesh]) -> Mesh:

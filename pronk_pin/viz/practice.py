@@ -1,116 +1,310 @@
-"""Scenes from results: the robot as it was simulated, beside its reference."""
+"""Scenes from results: robots as they were simulated, each beside its reference."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import xarray as xr
 
-from .._typing import Array
+from .._typing import Array, BoolArray
 from ..compare import Results
+from ..compare.scenario import load_scenario
 from ..errors import InvalidInput
 from ..gait import Gait, load_library
 from ..robot import Robot, load_robot
-from .scene import Scene, Track
+from .gait_scenes import SHOWN_SPEED, nearest, numbers
+from .programme import Choice, Programme
+from .scene import SECOND_COLOR, Mark, Scene, Track
+from .style import look
 
 BEFORE, AFTER = 3, 9
-"""Strides of a practice scene before and after the learning is switched on."""
+"""Strides of a window before and after the learning is switched on."""
+
+WINDOW = BEFORE + AFTER
+"""Strides that are shown together."""
+
+FORCE_WINDOW = 1.0 / 60.0
+"""Time over which forces are averaged [s]: a frame of the page."""
+
+ASIDE = 0.55
+"""Distance of a second robot from the first [m]."""
+
+START, LAST = "around the start of learning", "the last ones"
+ALONE, EARLIER = "nothing", "before learning"
+
+SPEED, CONTROLLER, SCENARIO = "speed [m/s]", "controller", "scenario"
+BESIDE, STRIDES = "beside it", "strides"
+"""The options of the page, in their order."""
 
 
-def practice_scene(
+def practice_programme(
     results: Results,
     *,
     speed: float | None = None,
     controller: str | None = None,
     scenario: str | None = None,
-) -> Scene:
-    """The strides around the moment at which learning starts; the last ones without learning.
+    beside: str | None = None,
+    stride: int | None = None,
+) -> Programme:
+    """The robots of a result, to choose from by speed, controller, scenario and strides.
 
     Args:
         results: The results folder.
-        speed: Desired speed [m/s]; by default the one nearest to 0.5.
-        controller: By default "ilc", or the first there is.
-        scenario: By default the first.
+        speed: Desired speed shown first [m/s]; by default the one nearest to 0.5.
+        controller: Controller shown first; by default "ilc", or the first there is.
+        scenario: Scenario shown first; by default the first.
+        beside: What runs beside it: a controller, "before learning" for its own strides before
+            the learning was switched on, or "nothing", the default.
+        stride: Show the dozen strides with this one first; by default those around the start of
+            learning, or the last ones where nothing was learned.
 
     Raises:
-        InvalidInput: The result holds no such speed, controller or scenario, or no finished stride.
+        InvalidInput: The result holds no such speed, controller, scenario or stride.
     """
     experiment = results.experiment
+    speeds, controllers = list(experiment.speeds), list(experiment.controllers)
     if controller is None:
-        controller = "ilc" if "ilc" in experiment.controllers else experiment.controllers[0]
-    strides = results.strides(results.find(controller=controller, scenario=scenario))
-    speeds = strides["speed"].to_numpy()
-    wanted = 0.5 if speed is None else speed
-    index = int(np.argmin(np.abs(speeds - wanted)))
-    if speed is not None and abs(speeds[index] - speed) > 1e-6:
-        known = ", ".join(f"{v:g}" for v in speeds)
-        raise InvalidInput(f"the result has no speed {speed:g} m/s; choose one of: {known}")
-    robot = load_robot(experiment.robot)
-    gait = load_library(experiment.robot).at(float(speeds[index]))
-    mine = _window(strides.isel(speed=index))
-    mine = mine.assign(start=mine["start"] - mine["start"][0])  # the scene's clock starts at 0
-    learned = mine["start"].to_numpy()[mine["learning"].to_numpy() == 1]
-    began = f"; learning starts after {learned[0]:.1f} s" if learned.size else ""
-    return Scene(
-        robot,
-        [_measured(robot, mine, controller), _planned(robot, mine, gait)],
-        title=f"{robot.name.upper()} pronking at {gait.speed:g} m/s",
-        caption=f"{controller}, scenario {strides.attrs['scenario']}{began}",
-    )
+        controller = "ilc" if "ilc" in controllers else controllers[0]
+    wanted = SHOWN_SPEED if speed is None else speed
+    at = int(np.argmin(np.abs(np.asarray(speeds) - wanted)))
+    if speed is not None:
+        at = nearest(speeds, speed, "speed")
+    scenario = experiment.scenarios[0] if scenario is None else scenario
+    cell = results.find(controller=controller, scenario=scenario)
+    windows = _windows(results.strides(cell))
+    reader = _Reader(results)
+    first = {
+        SPEED: f"{speeds[at]:g}",
+        CONTROLLER: controller,
+        SCENARIO: scenario,
+        BESIDE: ALONE if beside is None else beside,
+        STRIDES: windows[0] if stride is None else _window_of(windows, stride),
+    }
+    options = {
+        SPEED: numbers(speeds),
+        CONTROLLER: controllers,
+        SCENARIO: list(experiment.scenarios),
+        BESIDE: [ALONE, EARLIER, *controllers],
+        STRIDES: windows,
+    }
+    filed = {STRIDES: windows[:2], SPEED: options[SPEED], BESIDE: [ALONE, EARLIER]}
+    if START not in windows:
+        filed = {SPEED: options[SPEED]}
+    return Programme(reader.scene, options, first, filed)
 
 
-def _window(strides: xr.Dataset) -> xr.Dataset:
-    """A dozen strides around the start of learning, or the last ones."""
+@dataclass(frozen=True)
+class _Reader:
+    """Makes the scenes of a result."""
+
+    results: Results
+
+    def scene(self, choice: Choice) -> Scene:
+        """The scene of a choice."""
+        speed, scenario = float(choice[SPEED]), choice[SCENARIO]
+        robot_name = self.results.experiment.robot
+        robot, gait = load_robot(robot_name), load_library(robot_name).at(speed)
+        mine = self._strides(choice[CONTROLLER], scenario, speed)
+        shown = _cut(mine, choice[STRIDES])
+        tracks = [*_pair(robot, gait, shown, look(choice[CONTROLLER]).label)]
+        if choice[BESIDE] != ALONE:
+            second = mine if choice[BESIDE] == EARLIER else None
+            if second is None:
+                second = self._strides(choice[BESIDE], scenario, speed)
+                label = f"{look(choice[BESIDE]).label}, beside"
+                cut = _cut(second, choice[STRIDES])
+            else:
+                label, cut = "before learning", _cut_before(second)
+            pair = _pair(robot, gait, cut, label)
+            tracks += [replace(track.moved(y=ASIDE), color=_beside(track)) for track in pair]
+        learned = shown["start"].to_numpy()[shown["learning"].to_numpy() == 1]
+        began = float(learned[0] - shown["start"][0]) if learned.size else 0.0
+        note = f"; learning starts after {began:.1f} s" if began > 0.0 else ""
+        return Scene(
+            robot,
+            tracks,
+            force_window=FORCE_WINDOW,
+            title=f"{robot.name.upper()} pronking at {speed:g} m/s",
+            caption=f"scenario {scenario}, strides {choice[STRIDES]}{note}",
+            friction=load_scenario(scenario).ground_friction,
+        )
+
+    def _strides(self, controller: str, scenario: str, speed: float) -> xr.Dataset:
+        """The strides of one robot."""
+        strides = _load(self.results, controller, scenario)
+        return strides.isel(speed=nearest(list(strides["speed"].to_numpy()), speed, "speed"))
+
+
+@lru_cache(maxsize=8)
+def _load(results: Results, controller: str, scenario: str) -> xr.Dataset:
+    return results.strides(results.find(controller=controller, scenario=scenario))
+
+
+def _beside(track: Track) -> tuple[float, float, float] | None:
+    return None if track.ghost else SECOND_COLOR
+
+
+def _windows(strides: xr.Dataset) -> list[str]:
+    """What the page offers to show of the strides."""
+    count = int(strides["count"].max())
+    learned = bool((strides["learning"] == 1).any())
+    starts = range(0, max(count - WINDOW, 0) + 1, WINDOW)
+    named = [START, LAST] if learned else [LAST]
+    return [*named, *(f"from {first} on" for first in starts)]
+
+
+def _window_of(windows: list[str], stride: int) -> str:
+    """The window in the list that a stride is in."""
+    starts = [int(text.split()[1]) for text in windows if text.startswith("from ")]
+    if not 0 <= stride < starts[-1] + WINDOW:
+        raise InvalidInput(
+            f"there is no stride {stride}; choose one from 0 to {starts[-1] + WINDOW - 1}"
+        )
+    return f"from {max(first for first in starts if first <= stride)} on"
+
+
+def _cut(strides: xr.Dataset, window: str) -> xr.Dataset:
+    """The strides of a window of one robot."""
     count = int(strides["count"])
     if count == 0:
         raise InvalidInput(f"no stride was finished at {float(strides['speed']):g} m/s")
+    first = max(count - WINDOW, 0)
+    if window == START:
+        learning = np.flatnonzero(strides["learning"].to_numpy()[:count] == 1)
+        first = max(int(learning[0]) - BEFORE, 0) if learning.size else first
+    elif window != LAST:
+        first = int(window.split()[1])
+        if first >= count:
+            raise InvalidInput(f"this robot finished {count} strides only; choose earlier ones")
+    return strides.isel(stride=slice(first, min(first + WINDOW, count)))
+
+
+def _cut_before(strides: xr.Dataset) -> xr.Dataset:
+    """The last strides of one robot before the learning was switched on."""
+    count = int(strides["count"])
     learning = np.flatnonzero(strides["learning"].to_numpy()[:count] == 1)
-    first = learning[0] - BEFORE if learning.size else count - BEFORE - AFTER
-    first = max(int(first), 0)
-    return strides.isel(stride=slice(first, min(first + BEFORE + AFTER, count)))
+    end = int(learning[0]) if learning.size else 0
+    if end == 0:
+        raise InvalidInput("this robot has no strides before learning; choose another")
+    return strides.isel(stride=slice(max(end - WINDOW, 0), end))
 
 
-def _clock(strides: xr.Dataset, k: int) -> tuple[Array, Array]:
-    """Times of the samples of stance and flight of a stride [s], as far as each lasted."""
-    one = strides.isel(stride=k)
-    start, stance, duration = (float(one[name]) for name in ("start", "stance", "duration"))
-    planned = strides["planned_duration"].to_numpy()
-    down, up = (one["phase"].to_numpy() * length for length in planned)
-    return start + down[down < stance], start + stance + up[up < duration - stance]
+def _pair(robot: Robot, gait: Gait, strides: xr.Dataset, name: str) -> tuple[Track, Track]:
+    """A robot as simulated, and its reference, both from time 0 and place 0 on."""
+    strides = strides.assign(start=strides["start"] - strides["start"][0])
+    measured, planned = _measured(robot, strides, name), _planned(robot, strides, gait, name)
+    x = -float(measured.q[0, 0])
+    return measured.moved(x), planned.moved(x)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Where the samples of some strides lie: on the phase grid, as far as each part lasted.
+
+    Attributes:
+        since: Times since the beginning of the part [s], shape (strides, 2, samples).
+        begin: When the parts begin [s], shape (strides, 2, 1).
+        within: Which samples there are, shape (strides, 2, samples).
+    """
+
+    since: Array
+    begin: Array
+    within: BoolArray
+
+    @classmethod
+    def of(cls, strides: xr.Dataset) -> _Samples:
+        """Those of the strides of one robot."""
+        start, stance, whole = (strides[key].to_numpy() for key in ("start", "stance", "duration"))
+        begin = np.stack([start, start + stance], axis=1)[..., None]
+        length = np.stack([stance, whole - stance], axis=1)[..., None]
+        planned = strides["planned_duration"].to_numpy()[:, None]  # (2, 1)
+        since = np.broadcast_to(
+            strides["phase"].to_numpy() * planned, (len(start), 2, strides.sizes["phase"])
+        )
+        return cls(since, begin, since < length - 1e-9)
+
+    @property
+    def times(self) -> Array:
+        """The times of all samples, one after the other [s], shape (m,)."""
+        return np.asarray((self.begin + self.since)[self.within])
+
+    def curve(self, strides: xr.Dataset, name: str) -> Array:
+        """A curve at all samples, one after the other, shape (m, ...)."""
+        values = strides[name].transpose(*_order(strides[name]), ...).to_numpy()
+        if "stride" not in strides[name].dims:
+            values = np.broadcast_to(values, (len(self.since), *values.shape))
+        return np.asarray(values[self.within], dtype=float)
+
+    def forces(self, strides: xr.Dataset) -> Array | None:
+        """Forces of the ground [N], shape (m, 4, 3), each the mean over `FORCE_WINDOW` before.
+
+        They are kept for the last strides only, tick by tick: NaN elsewhere, None if these are all
+        others. A touchdown is one tick of thousands of newtons; a mean keeps its impulse, where a
+        sample would miss it.
+        """
+        last = strides["stride"].to_numpy() - (int(strides["count"]) - strides.sizes["last"])
+        shown = np.flatnonzero(last >= 0)
+        if not shown.size:
+            return None
+        kept = strides["tick_force"].isel(last=last[shown])
+        ticks = kept.transpose("last", "part", "tick", "foot", ...).to_numpy()
+        ticks = ticks[np.isfinite(ticks).all(axis=(-2, -1))]  # (ticks, 4, 3), one after the other
+        timestep = float(strides.attrs["timestep"])
+        impulse = np.concatenate([np.zeros((1, 12)), np.cumsum(ticks.reshape(-1, 12), axis=0)])
+        impulse *= timestep
+        begin = float(self.begin[shown[0], 0, 0])
+        clock = begin + timestep * np.arange(len(impulse))
+        times = self.times
+        before = np.maximum(times - FORCE_WINDOW, begin)
+        given = [
+            np.interp(times, clock, column) - np.interp(before, clock, column)
+            for column in impulse.T
+        ]
+        span = np.maximum(times - before, timestep)
+        forces = np.where(times < begin, np.nan, np.array(given) / span).T
+        return np.asarray(forces.reshape(len(times), 4, 3))
+
+
+def _order(curve: xr.DataArray) -> list[str]:
+    return [name for name in ("stride", "part", "phase") if name in curve.dims]
 
 
 def _measured(robot: Robot, strides: xr.Dataset, name: str) -> Track:
     """The robot as simulated."""
-    times, base, joints = [], [], []
-    measured = (strides["reference"] - strides["error"]).transpose("stride", "part", "phase", ...)
-    for k in range(strides.sizes["stride"]):
-        for part, clock in enumerate(_clock(strides, k)):
-            one = {"stride": k, "part": part, "phase": slice(len(clock))}
-            times.append(clock)
-            base.append(strides["base"].isel(one).to_numpy())
-            joints.append(measured.isel(one).to_numpy())
-    return _track(robot, name, times, base, joints, ghost=False)
+    samples = _Samples.of(strides)
+    error = samples.curve(strides, "error")
+    joints = samples.curve(strides, "reference") - error
+    torque = samples.curve(strides, "feedback") + samples.curve(strides, "feedforward")
+    return Track(
+        name,
+        samples.times,
+        _configurations(robot, samples.curve(strides, "base"), joints),
+        error=error,
+        torque=np.clip(torque, -robot.tau_max, robot.tau_max),
+        forces=samples.forces(strides),
+        marks=[
+            Mark(float(begin), int(number), str(part))
+            for number, begins in zip(strides["stride"], samples.begin[..., 0], strict=True)
+            for part, begin in zip(strides["part"].to_numpy(), begins, strict=True)
+        ],
+    )
 
 
-def _planned(robot: Robot, strides: xr.Dataset, gait: Gait) -> Track:
+def _planned(robot: Robot, strides: xr.Dataset, gait: Gait, name: str) -> Track:
     """The gait, put down where the robot touches down at the beginning of each stride."""
-    times, base, joints = [], [], []
-    for k in range(strides.sizes["stride"]):
-        one = strides.isel(stride=k)
-        x = float(one["base"][0, 0, 0])
-        for phase, clock in zip((gait.stance, gait.flight), _clock(strides, k), strict=True):
-            begin = clock[0]
-            s = np.minimum((clock - begin) / phase.duration, 1.0)
-            position = phase.base_reference(s)[0][:, :2] + [x, 0.0]
-            times.append(clock)
-            base.append(position)
-            joints.append(phase.joint_reference(s)[0])
-    return _track(robot, "reference", times, base, joints, ghost=True)
+    samples = _Samples.of(strides)
+    place = strides["base"].isel(part=0, phase=0, axis=0).to_numpy()  # (strides,)
+    s = strides["phase"].to_numpy()
+    base = np.stack([phase.base_reference(s)[0][:, :2] for phase in (gait.stance, gait.flight)])
+    moved = np.repeat(base[None], len(place), axis=0)  # (strides, 2, samples, 2)
+    moved[..., 0] += place[:, None, None]
+    q = _configurations(robot, moved[samples.within], samples.curve(strides, "reference"))
+    return Track(f"reference of {name}", samples.times, q, ghost=True)
 
 
-def _track(
-    robot: Robot, name: str, times: list[Array], base: list[Array], joints: list[Array], ghost: bool
-) -> Track:
-    position = np.concatenate(base)
-    xyz = np.column_stack([position[:, 0], np.zeros(len(position)), position[:, 1]])
-    q = robot.q_from_base(xyz, np.concatenate(joints))
-    return Track(name, np.concatenate(times), q, ghost=ghost)
+def _configurations(robot: Robot, base: Array, joints: Array) -> Array:
+    """Configurations (n, 19) from the trunk's x and z (n, 2) and the joints (n, 12)."""
+    xyz = np.column_stack([base[:, 0], np.zeros(len(base)), base[:, 1]])
+    return robot.q_from_base(xyz, joints)

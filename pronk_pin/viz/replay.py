@@ -1,41 +1,49 @@
-"""A scene as one HTML file that plays by itself, from disk and without a network."""
+"""Scenes as one HTML file that plays by itself, from disk and without a network."""
 
 from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
 from ..errors import InvalidInput, cannot_write
-from . import drawing
+from .documents import FPS, film_blob, robot_blob
+from .page import page, player_source, viewer_source
+from .programme import Choice, Programme
 from .scene import Scene
+
+LARGEST = 4_900_000
+"""Size that a file keeps below [bytes], unless its first film alone is larger."""
 
 _START = """\
 <script>
-  const viewer = createViewer();
-  for (const text of $messages) {
-    viewer.handle_command_bytearray(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)));
-  }
-  // A link to a moment: "replay.html#t=0.35" opens paused at 0.35 s.
-  const moment = /^#t=([0-9.]+)$$/.exec(location.hash);
-  if (moment) {
-    viewer.animator.pause();
-    viewer.animator.seek(parseFloat(moment[1]));
-    viewer.animator.display_progress(parseFloat(moment[1]));
-  }
+  const films = $films;
+  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  let player;
+  Player.start({
+    robot: bytes("$robot"), options: $options, first: $first,
+    film: async (choice) => {
+      const text = films[JSON.stringify(Object.values(choice))];
+      if (!text) throw new Error("This choice is not in the file.");
+      return bytes(text);
+    },
+  }).then((started) => { player = started; });
 </script>
 """
 
 
-def write_replay(scene: Scene, path: Path | str, *, fps: float = 60.0) -> Path:
-    """Write a scene as one self-contained HTML file, which plays at once and repeats.
+def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS) -> Path:
+    """Write a scene, or several to choose from, as one HTML file that plays at once and repeats.
 
-    The page's own controls (top right, "Open Controls") pause, scrub and slow it down; with
-    `#t=0.35` behind its address it opens paused 0.35 s after the scene's beginning.
+    Of a programme the file holds `Programme.choices`, as far as it stays below `LARGEST`.
+
+    The page has the controls of the live page; with `#t=0.35` behind its address it opens paused
+    0.35 s after the scene's beginning.
 
     Args:
-        scene: What to show.
+        shown: What to show.
         path: The file; its folder is created.
         fps: Frames that are stored for each second; the page interpolates between them.
 
@@ -47,9 +55,7 @@ def write_replay(scene: Scene, path: Path | str, *, fps: float = 60.0) -> Path:
         InvalidInput: fps is not positive.
     """
     path = Path(path)
-    if not fps > 0.0:
-        raise InvalidInput(f"fps must be positive, not {fps}")
-    html = replay_html(scene, fps=fps)
+    html = replay_html(shown, fps=fps)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(html, encoding="utf-8")
@@ -58,9 +64,48 @@ def write_replay(scene: Scene, path: Path | str, *, fps: float = 60.0) -> Path:
     return path
 
 
-def replay_html(scene: Scene, *, fps: float = 60.0) -> str:
+def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
     """The text of the file that `write_replay` writes."""
-    messages = [*drawing.setup_messages(scene), drawing.animation_message(scene, fps=fps)]
-    texts = json.dumps([base64.b64encode(message).decode("ascii") for message in messages])
-    start = Template(_START).substitute(messages=texts)
-    return drawing.page(scene, f"<script>{drawing.viewer_source()}</script>\n{start}")
+    if not fps > 0.0:
+        raise InvalidInput(f"fps must be positive, not {fps}")
+    programme = Programme.of(shown)
+    first = programme.scene()
+    frame = page(
+        first.title,
+        f"<script>{viewer_source()}</script>\n<script>{player_source()}</script>\n$start",
+    )
+    robot = _text(robot_blob(first))
+    films: dict[str, str] = {}
+    held: list[Choice] = []
+    size = len(frame.encode()) + len(robot) + 2_000
+    for choice in programme.choices():
+        text = _text(film_blob(programme.scene(choice), fps=fps))
+        if films and size + len(text) > LARGEST:
+            break
+        size += len(text) + 100
+        films[json.dumps([*choice.values()], separators=(",", ":"))] = text
+        held.append(choice)
+    start = Template(_START).substitute(
+        robot=robot,
+        films=_json(films),
+        options=_json(_options(programme, held)),
+        first=_json(dict(programme.first)),
+    )
+    return frame.replace("$start", start, 1)
+
+
+def _options(programme: Programme, held: Sequence[Choice]) -> dict[str, list[str]]:
+    """The values of each option that the file holds, in the programme's order."""
+    return {
+        name: [value for value in values if any(choice[name] == value for choice in held)]
+        for name, values in programme.options.items()
+    }
+
+
+def _text(blob: bytes) -> str:
+    return base64.b64encode(blob).decode("ascii")
+
+
+def _json(value: object) -> str:
+    """JSON that may stand in a `<script>`."""
+    return json.dumps(value).replace("<", "\\u003c")

@@ -10,22 +10,24 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import urlparse
 
 import numpy as np
 import pytest
-import umsgpack
 from tornado.websocket import websocket_connect
 
 from pronk_pin.errors import InvalidInput, PortUnavailable, PronkError
-from pronk_pin.viz import Scene, drawing, live, serve
+from pronk_pin.viz import Programme, Scene, Track, serve
+from pronk_pin.viz.browser import Browser
+from pronk_pin.viz.documents import film_blob, robot_blob
 from pronk_pin.viz.live import LiveServer
 
 if TYPE_CHECKING:
-    from conftest import Browser
+    from conftest import Eye
 
 PROGRAM = """
 import signal, numpy as np
@@ -50,50 +52,90 @@ def listens(host: str, port: int) -> bool:
         return probe.connect_ex((host, port)) == 0
 
 
-def listen(url: str, seconds: float) -> list[dict[str, Any]]:
+def listen(url: str, seconds: float) -> list[np.ndarray]:
     """What a page receives in that time [s]."""
 
-    async def receive() -> list[dict[str, Any]]:
+    async def receive() -> list[np.ndarray]:
         page = await websocket_connect(f"{url.replace('http', 'ws')}stream")
         received, end = [], time.monotonic() + seconds
-        while time.monotonic() < end:
-            message = await page.read_message()
+        while (left := end - time.monotonic()) > 0.0:
+            try:
+                message = await asyncio.wait_for(page.read_message(), left)
+            except asyncio.TimeoutError:
+                break
             if not isinstance(message, bytes):
                 break
-            received.append(message)
+            received.append(np.frombuffer(message, "<f4"))
         page.close()
-        return [umsgpack.unpackb(message) for message in received]
+        return received
 
     return asyncio.run(receive())
 
 
-def playing(server: LiveServer, duration: float) -> threading.Thread:
-    thread = threading.Thread(target=server.play, args=(duration,))
-    thread.start()
-    return thread
+def get(url: str) -> bytes:
+    return bytes(urllib.request.urlopen(url, timeout=20).read())
 
 
-def test_a_page_gets_the_robots_and_then_their_motion(scene: Scene) -> None:
-    with LiveServer(scene) as server:
-        thread = playing(server, 1.0)
-        received = listen(server.url, 0.8)
+def test_a_page_gets_each_instant_that_a_loop_displays(scene: Scene) -> None:
+    robot, hop = scene.robot, scene.tracks[0]
+    posture = Scene(robot, (Track("robot", np.zeros(1), hop.q[:1]),))
+    with LiveServer(posture) as server:
+        stop = threading.Event()
+
+        def loop() -> None:
+            k = 0
+            while not stop.wait(0.01):
+                server.display(hop.q[k := (k + 1) % 100])
+
+        thread = threading.Thread(target=loop)
+        thread.start()
+        received = listen(server.url, 1.0)
+        stop.set()
         thread.join()
-    sent = [message["path"] for message in received if message["type"] == "set_object"]
-    paths = [path for path, _ in scene.transforms(0.0)]
-    assert set(sent) == {f"/meshcat/{path}" for path in paths} | {"/meshcat/sun"}
-    frames = sum(
-        message["type"] == "set_transform" and message["path"] == "/meshcat/robot/trunk_0"
-        for message in received
-    )
-    assert frames > 20
+    assert len(received) > 30
+    shown = np.stack(received)[:, 2:21]
+    distances = np.abs(shown[:, None] - hop.q[None, :100].astype("<f4")).max(axis=-1).min(axis=1)
+    assert distances.max() < 1e-6
 
 
-def test_the_page_and_the_viewer_come_from_the_server(scene: Scene) -> None:
+def test_a_page_that_comes_late_gets_the_last_instant(scene: Scene) -> None:
     with LiveServer(scene) as server:
-        page = urllib.request.urlopen(server.url, timeout=10).read().decode()
-        viewer = urllib.request.urlopen(f"{server.url}viewer.js", timeout=10).read().decode()
-    assert "<h1>Hop</h1>" in page
-    assert "MeshCat" in viewer
+        server.seek(0.3)
+        (row,) = listen(server.url, 0.5)
+    np.testing.assert_allclose(row[2:21], scene.tracks[0].at(np.array([0.3]))["q"][0], atol=1e-6)
+
+
+def test_the_page_its_parts_and_its_films_come_from_the_server(scene: Scene) -> None:
+    with LiveServer(scene) as server:
+        page = get(server.url).decode()
+        assert "MeshCat" in get(f"{server.url}viewer.js").decode()
+        assert "class Player" in get(f"{server.url}player.js").decode()
+        assert get(f"{server.url}robot") == robot_blob(scene)
+        assert get(f"{server.url}film") == film_blob(scene)
+    assert "<title>Hop</title>" in page
+
+
+def test_a_choice_that_does_not_exist_is_told(scene: Scene) -> None:
+    programme = Programme(lambda choice: scene, {"speed": ["1", "2"]}, {"speed": "1"})
+    with LiveServer(programme) as server:
+        assert get(f"{server.url}film?speed=2") == film_blob(scene)
+        with pytest.raises(urllib.error.HTTPError) as caught:
+            get(f"{server.url}film?speed=3")
+    assert caught.value.code == 400
+    assert "there is no speed 3; choose one of: 1, 2" in caught.value.read().decode()
+
+
+def test_an_instant_must_fit_the_scene(scene: Scene) -> None:
+    q = scene.robot.standing
+    with LiveServer(scene) as server:
+        with pytest.raises(InvalidInput, match="1 configurations for 2 tracks"):
+            server.display(q)
+        with pytest.raises(InvalidInput, match=r"track 'robot' shows forces; give forces=\[...\]"):
+            server.display(q, q)
+        with pytest.raises(InvalidInput, match="forces has shape"):
+            server.display(q, q, forces=[np.zeros(5)])
+        with pytest.raises(InvalidInput, match="no channel lift"):
+            server.display(q, q, lift=[np.zeros(3)])
 
 
 def test_only_this_machine_can_reach_it(scene: Scene) -> None:
@@ -128,21 +170,6 @@ def test_serve_ends_in_time_and_leaves_nothing_behind(
     assert threading.active_count() == before
 
 
-def test_what_comes_too_late_is_left_out(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    def slow(scene: Scene, moment: float) -> list[bytes]:
-        time.sleep(0.1)
-        return original(scene, moment)
-
-    with LiveServer(scene) as server:
-        original = drawing.frame_messages
-        monkeypatch.setattr(live.drawing, "frame_messages", slow)
-        begin = time.monotonic()
-        thread = playing(server, 1.0)
-        listen(server.url, 0.7)
-        thread.join()
-    assert time.monotonic() - begin < 1.5
-
-
 def test_ctrl_c_ends_it_cleanly() -> None:
     assert end_by(lambda process: process.send_signal(signal.SIGINT)) == "ended\n"
 
@@ -157,7 +184,7 @@ def end_by(end: Callable[[subprocess.Popen[str]], None]) -> str:
         [sys.executable, "-c", PROGRAM], stdout=subprocess.PIPE, text=True, start_new_session=True
     )
     assert process.stdout is not None
-    url = process.stdout.readline().split(" plays at ")[1].split()[0]
+    url = process.stdout.readline().split(" is at ")[1].split()[0]
     assert listens("127.0.0.1", port_of(url))
     end(process)
     rest, _ = process.communicate(timeout=10)
@@ -169,23 +196,44 @@ def end_by(end: Callable[[subprocess.Popen[str]], None]) -> str:
 
 @pytest.mark.browser
 def test_the_page_shows_a_moving_robot_and_can_be_left_and_reopened(
-    scene: Scene, browser: Browser
+    scene: Scene, browser: Eye
 ) -> None:
     with LiveServer(scene) as server:
         for _ in range(2):
             browser.open(server.url)
-            pushing, flying = (look_at(server, browser, time) for time in (0.1, 0.3))
-            assert np.sum(pushing[250:].max(axis=-1) < 60) > 1_000  # the dark calves
-            assert np.sum(np.abs(pushing - flying).max(axis=-1) > 40) > 5_000
+            browser.run("player.pause(); player.seek(0.1)")
+            pushing = browser.scenery()
+            browser.run("player.seek(0.3)")
+            assert np.sum(pushing.max(axis=-1) < 60) > 300  # the dark calves
+            assert np.sum(np.abs(pushing - browser.scenery()).max(axis=-1) > 40) > 5_000
+        browser.wait("true")
         assert server.pages == 1
     browser.wait("document.getElementById('state').textContent.includes('has ended')")
     assert browser.errors == []
 
 
-def look_at(server: LiveServer, browser: Browser, time: float) -> np.ndarray:
-    """The page once it shows a moment [s] of the scene."""
-    ground = dict(server.scene.transforms(time))["ground"][0, 3]
-    server.send(drawing.frame_messages(server.scene, time))
-    position = "viewer.scene_tree.find(['meshcat', 'ground']).object.position.x"
-    browser.wait(f"Math.abs({position} - {ground:.9f}) < 1e-5")
-    return browser.look()
+@pytest.mark.browser
+def test_a_loop_moves_the_robot_on_the_page(scene: Scene, browser: Eye) -> None:
+    hop = scene.tracks[0]
+    posture = Scene(scene.robot, (Track("robot", np.zeros(1), hop.q[:1]),))
+    with LiveServer(posture) as server:
+        browser.open(server.url)
+        for k in range(1, 60):
+            server.display(hop.q[k])
+            time.sleep(0.02)
+        x = "player.figures[0].nodes[1].position.x"
+        browser.wait(f"Math.abs({x} - {hop.q[59, 0]}) < 1e-5")
+        assert browser.run("player.received") > 10
+    assert browser.errors == []
+
+
+@pytest.mark.browser
+def test_two_pages_are_paused_and_scrubbed_each_for_itself(scene: Scene, browser: Eye) -> None:
+    with LiveServer(scene) as server, Browser(400, 300) as second:
+        browser.open(server.url)
+        second.open(server.url)
+        browser.run("player.pause(); player.seek(2.0)")
+        second.run("player.seek(0.5)")
+        assert server.pages == 2
+        assert browser.run("[player.time, player.playing]") == [2.0, False]
+        assert second.run("player.playing")

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import Gait, GaitPhase
-from pronk_pin.robot import Robot
+from pronk_pin.kinematics import foot_positions
+from pronk_pin.robot import Robot, load_robot
 from pronk_pin.viz import Scene, Track, gait_scene
-from pronk_pin.viz.meshes import Mesh, grid_faces, sphere, thin
-from pronk_pin.viz.scene import arrow
-
-LINKS = {"trunk_0": "trunk", "FL_hip_0": "FL_hip", "RR_calf_0": "RR_calf", "FR_foot_0": "FR_foot"}
-"""Some of the visuals, and the frames they are fixed to."""
+from pronk_pin.viz.meshes import Appearance, Mesh, appearance, grid_faces, sphere, thin
 
 
 def some_motion(robot: Robot, n: int = 40) -> np.ndarray:
@@ -24,20 +24,37 @@ def some_motion(robot: Robot, n: int = 40) -> np.ndarray:
     return np.stack([pin.interpolate(robot.model, *ends, w) for w in np.linspace(0, 1, n)])
 
 
-def test_links_are_where_pinocchio_puts_them(robot: Robot) -> None:
-    q = some_motion(robot)
-    scene = Scene(robot, (Track("robot", np.linspace(0.0, 1.0, len(q)), q),))
-    shown = dict(scene.transforms(scene.times(39.0)[13]))
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q[13])
-    view = np.append(scene.view(13 / 39.0), 0.0)
-    for part in scene.appearance.parts:
-        if part.name not in LINKS:
-            continue
-        link = data.oMf[robot.model.getFrameId(LINKS[part.name])].homogeneous
-        pose = shown[f"robot/{part.name}"].copy()
-        pose[:3, 3] += view
-        np.testing.assert_allclose(pose, link, atol=1e-12)
+def placed(look: Appearance, q: np.ndarray) -> dict[str, np.ndarray]:
+    """Poses of the parts as the page computes them: down the tree of joints, in plain algebra."""
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_quat(q[3:7]).as_matrix()
+    base[:3, 3] = q[:3]
+    poses = [np.eye(4), base]
+    for angle, joint in zip(q[7:], look.joints, strict=True):
+        turn = np.eye(4)
+        turn[:3, :3] = Rotation.from_rotvec(angle * joint.axis).as_matrix()
+        poses.append(poses[joint.parent] @ joint.placement @ turn)
+    return {part.name: poses[part.joint] @ part.placement for part in look.parts}
+
+
+@pytest.mark.parametrize("name", ["a1", "go2", "solo12"])
+def test_links_are_where_pinocchio_puts_them(name: str) -> None:
+    robot = load_robot(name)
+    look, data = appearance(robot), robot.model.createData()
+    visuals = pin.buildGeomFromUrdf(
+        robot.model,
+        str(robot.urdf_path),
+        pin.GeometryType.VISUAL,
+        package_dirs=[str(robot.package_dir)],
+    )
+    places = visuals.createData()
+    q = some_motion(robot)[13]
+    pin.updateGeometryPlacements(robot.model, data, visuals, places, q)
+    for part, pose in placed(look, q).items():
+        expected = places.oMg[visuals.getGeometryId(part)].homogeneous
+        np.testing.assert_allclose(pose, expected, atol=1e-12)
+    feet = look.feet(q[None])[0]
+    np.testing.assert_allclose(feet, foot_positions(robot, q), atol=1e-12)
 
 
 def test_every_leg_is_shown_in_four_parts(scene: Scene) -> None:
@@ -49,58 +66,43 @@ def test_every_leg_is_shown_in_four_parts(scene: Scene) -> None:
 
 
 def test_a_steady_run_stays_in_place_while_the_ground_scrolls(scene: Scene) -> None:
-    for time in (0.0, 1.3, 4.9):
-        shown = dict(scene.transforms(time))
-        assert shown["robot/trunk_0"][0, 3] == pytest.approx(0.0, abs=1e-6)
-        assert shown["reference/trunk_0"][0, 3] == pytest.approx(-0.1, abs=1e-6)
-        assert shown["ground"][0, 3] == pytest.approx(-0.5 * time, abs=1e-6)
+    times = np.array([0.0, 1.3, 4.9])
+    robot, reference = scene.rows(times)
+    view = scene.view(times)
+    np.testing.assert_allclose(view, np.stack([0.5 * times, 0.0 * times], axis=1), atol=1e-6)
+    np.testing.assert_allclose(robot["q"][:, 0] - view[:, 0], 0.0, atol=1e-6)
+    np.testing.assert_allclose(reference["q"][:, 0] - view[:, 0], -0.1, atol=1e-6)
 
 
-def test_forces_are_arrows_from_the_lowest_points_of_the_feet(scene: Scene) -> None:
-    robot, track = scene.robot, scene.tracks[0]
-    k = 12
-    shown = dict(scene.transforms(float(track.t[k])))
-    _, feet = scene.appearance.place(track.q[k])
-    assert track.forces is not None
-    for leg, foot, force in zip(robot.legs, feet, track.forces[k], strict=True):
-        pose = shown[f"robot/force {leg}"]
-        tip = pose @ [0.0, 0.0, 1.0, 1.0]
-        lowest = foot - [0.5 * track.t[k], 0.0, robot.foot_radius]
-        np.testing.assert_allclose(pose[:3, 3], lowest, atol=1e-6)
-        np.testing.assert_allclose(tip[:3] - lowest, scene.force_scale * force, atol=1e-6)
-    assert not any("reference/force" in path for path in shown)
+def test_two_robots_stand_on_both_sides_of_the_middle(robot: Robot, hop: Track) -> None:
+    second = replace(hop.moved(y=0.6), name="second")
+    assert Scene(robot, (hop, second)).view(np.zeros(1))[0, 1] == pytest.approx(0.3)
 
 
-@pytest.mark.parametrize("vector", [[0, 0, 0.2], [0.1, -0.2, 0.05], [0, 0.3, 0], [0, 0, -0.1]])
-def test_an_arrow_is_a_rotation_with_a_scaled_axis(vector: list[float]) -> None:
-    pose = arrow(np.zeros(3), np.array(vector))
-    axes = pose[:3, :3] / np.linalg.norm(pose[:3, :3], axis=0)
-    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
-    np.testing.assert_allclose(pose[:3, 2], vector)
-
-
-def test_no_force_is_no_arrow() -> None:
-    assert np.abs(arrow(np.zeros(3), np.zeros(3))[:3, :3]).max() < 0.02
+def test_samples_are_shown_as_they_are(hop: Track) -> None:
+    row = hop.at(hop.t[[12, 77]])
+    for name in ("q", "forces", "error", "torque"):
+        values = getattr(hop, name)[[12, 77]].reshape(2, -1)
+        np.testing.assert_allclose(row[name], values, atol=1e-12)
 
 
 def test_between_samples_a_track_turns_the_short_way(robot: Robot) -> None:
     q = np.tile(robot.standing, (2, 1))
     q[1, 3:7] = -pin.Quaternion(pin.utils.rpyToMatrix(0.0, 0.0, 0.2)).coeffs()
     track = Track("robot", np.array([1.0, 2.0]), q)
-    half = pin.Quaternion(track.at(1.5)[0][3:7]).toRotationMatrix()
+    half = pin.Quaternion(track.at(np.array([1.5]))["q"][0, 3:7]).toRotationMatrix()
     np.testing.assert_allclose(half, pin.utils.rpyToMatrix(0.0, 0.0, 0.1), atol=1e-12)
 
 
 def test_a_track_holds_its_ends(hop: Track) -> None:
-    np.testing.assert_allclose(hop.at(-1.0)[0], hop.q[0])
-    np.testing.assert_allclose(hop.at(99.0)[0], hop.q[-1])
+    ends = hop.at(np.array([-1.0, 99.0]))["q"]
+    np.testing.assert_allclose(ends, hop.q[[0, -1]], atol=1e-12)
 
 
 def test_one_posture_is_a_scene(robot: Robot) -> None:
     scene = Scene(robot, (Track("robot", np.zeros(1), robot.standing[None]),))
     assert scene.times(60.0).tolist() == [0.0]
-    assert dict(scene.transforms(0.0))["robot/trunk_0"][2, 3] == pytest.approx(robot.standing[2])
+    np.testing.assert_allclose(scene.rows(scene.times(60.0))[0]["q"], robot.standing[None])
 
 
 @pytest.mark.parametrize(
@@ -109,16 +111,17 @@ def test_one_posture_is_a_scene(robot: Robot) -> None:
         ({"q": np.zeros((3, 18))}, r"q is of shape \(3, 18\), not \(3, 19\)"),
         ({"t": np.array([0.0, 1.0, 1.0])}, "t must increase"),
         ({"forces": np.zeros((3, 4))}, r"forces is of shape \(3, 4\), not \(3, 4, 3\)"),
-        ({"forces": np.full((3, 4, 3), np.nan)}, "forces holds NaN"),
-        ({"name": "a/b"}, "must not be empty or hold a '/'"),
+        ({"q": np.full((3, 19), np.nan)}, "q holds NaN"),
+        ({"torque": np.zeros((2, 12))}, r"torque is of shape \(2, 12\), not \(3, 12\)"),
+        ({"name": ""}, "needs a name"),
     ],
 )
-def test_a_track_refuses_what_it_cannot_show(
+def test_a_scene_refuses_what_it_cannot_show(
     robot: Robot, change: dict[str, object], message: str
 ) -> None:
     good = {"name": "robot", "t": np.arange(3.0), "q": np.tile(robot.standing, (3, 1))}
     with pytest.raises(InvalidInput, match=message):
-        Track(**(good | change))  # type: ignore[arg-type]
+        Scene(robot, (Track(**(good | change)),))  # type: ignore[arg-type]
 
 
 def test_tracks_of_one_name_are_refused(robot: Robot, hop: Track) -> None:
@@ -144,6 +147,12 @@ def test_a_gait_runs_on_over_its_strides(robot: Robot) -> None:
     assert track.forces is not None
     standing = track.forces[:, 0, 2] > 0.0
     np.testing.assert_array_equal(standing, (track.t + 1e-9) % 0.4 < 0.2)
+    assert [(mark.stride, mark.phase) for mark in track.marks[:3]] == [
+        (0, "stance"),
+        (0, "flight"),
+        (1, "stance"),
+    ]
+    assert [mark.t for mark in track.marks[:3]] == pytest.approx([0.0, 0.2, 0.4])
 
 
 def test_thinning_keeps_surfaces_round() -> None:

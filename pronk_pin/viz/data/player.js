@@ -1,0 +1,606 @@
+"use strict";
+// Plays films of a robot, see documents.py for what is in them. One clock drives robots, forces,
+// trails and plots; nothing is drawn that the data does not hold.
+
+const {THREE} = MeshCat;
+const GHOST_OPACITY = 0.35, TRAIL_SECONDS = 0.7, TILE = 0.5, LEAST_FORCE = 2.0;
+const FORCE_COLOR = 0xd55e00, CONE_COLOR = 0x009e73, TRAIL_COLOR = 0x444444;
+const $ = (id) => document.getElementById(id);
+
+// --- blobs: see packing.py ------------------------------------------------------------------
+
+async function unpack(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const buffer = await new Response(stream).arrayBuffer();
+  const length = new DataView(buffer).getUint32(0, true);
+  const data = new Uint8Array(buffer, 4 + length);
+  const text = new TextDecoder().decode(new Uint8Array(buffer, 4, length));
+  return JSON.parse(text, (key, value) => (value && value.$ ? decode(value, data) : value));
+}
+
+function decode(entry, data) {
+  const count = entry.shape.reduce((a, b) => a * b, 1);
+  if (entry.$ === "u4") {
+    return new Uint32Array(data.slice(entry.at, entry.at + 4 * count).buffer);
+  }
+  const rows = entry.shape[0], columns = entry.low.length, values = new Float32Array(count);
+  for (let c = 0, k = entry.at; c < columns; c++) {
+    for (let r = 0, sum = 0; r < rows; r++, k++) {
+      sum = (sum + data[k] + 256 * data[k + count]) & 0xffff;
+      values[r * columns + c] = sum === 0xffff ? NaN : entry.low[c] + entry.step[c] * sum;
+    }
+  }
+  return {values, rows, columns};
+}
+
+// --- the robot ------------------------------------------------------------------------------
+
+function meshGeometry(mesh) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(mesh.vertices.values, 3));
+  geometry.setIndex(new THREE.BufferAttribute(mesh.faces, 1));
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
+function fixed(object, placement) {
+  new THREE.Matrix4().fromArray(placement).decompose(
+    object.position, object.quaternion, object.scale);
+  return object;
+}
+
+const ARROW = (() => {
+  const profile = [[0, 0], [0.008, 0], [0.008, 0.75], [0.02, 0.75], [0, 1]];
+  const lathe = new THREE.LatheGeometry(profile.map(([r, z]) => new THREE.Vector2(r, z)), 16);
+  return lathe.rotateX(Math.PI / 2);  // along z
+})();
+
+// One track on the screen: a tree of joints with the parts on it, arrows, cones and trails.
+class Figure {
+  constructor(robot, track, film, world) {
+    this.robot = robot; this.track = track; this.film = film;
+    this.group = new THREE.Group();
+    world.add(this.group);
+    this.parts = [];
+    this.nodes = [null, new THREE.Group()];
+    this.group.add(this.nodes[1]);
+    for (const joint of robot.joints) {
+      const node = fixed(new THREE.Group(), joint.placement);
+      node.rest = node.quaternion.clone();
+      node.axis = new THREE.Vector3(...joint.axis);
+      (this.nodes[joint.parent] || this.group).add(node);
+      this.nodes.push(node);
+    }
+    for (const part of robot.parts) this.addPart(part);
+    this.arrows = this.perLeg("forces", () => {
+      const arrow = new THREE.Mesh(ARROW, new THREE.MeshLambertMaterial({color: FORCE_COLOR}));
+      arrow.castShadow = true;
+      return arrow;
+    });
+    this.cones = film.friction ? this.perLeg("forces", () => coneMesh(film.friction)) : [];
+    this.trails = track.ghost ? [] : robot.legs.map(() => this.addTrail());
+  }
+
+  addPart(part) {
+    const ghost = this.track.ghost;
+    const color = this.track.color || part.color;
+    // Lit by vertices: without a graphics card a third of the work that lighting pixels is.
+    const material = new THREE.MeshLambertMaterial({
+      color, transparent: ghost, opacity: ghost ? GHOST_OPACITY : 1,
+      // Where a ghost and the robot coincide the robot is in front, without speckles.
+      polygonOffset: ghost, polygonOffsetFactor: 2, polygonOffsetUnits: 2,
+    });
+    const mesh = fixed(new THREE.Mesh(this.robot.geometries[part.mesh], material), part.placement);
+    mesh.castShadow = !ghost;
+    mesh.receiveShadow = false;
+    mesh.name = part.name;
+    (this.nodes[part.joint] || this.group).add(mesh);
+    this.parts.push({mesh, joint: part.joint - 2, plain: new THREE.Color(material.color)});
+  }
+
+  perLeg(channel, make) {
+    if (!this.track.channels.includes(channel)) return [];
+    return this.robot.legs.map(() => {
+      const object = make();
+      this.group.add(object);
+      return object;
+    });
+  }
+
+  addTrail() {
+    const geometry = new THREE.BufferGeometry();
+    const size = Math.ceil(TRAIL_SECONDS * this.film.fps) + 2;
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * size), 3));
+    const color = this.track.color || TRAIL_COLOR;
+    const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({color}));
+    line.frustumCulled = false;
+    this.group.add(line);
+    return line;
+  }
+
+  // Show one instant: row holds q, feet and the channels; past the feet of the last moments.
+  show(row, past) {
+    const base = this.nodes[1], q = row.q;
+    base.position.set(q[0], q[1], q[2]);
+    base.quaternion.set(q[3], q[4], q[5], q[6]).normalize();
+    const turn = new THREE.Quaternion();
+    this.robot.joints.forEach((joint, i) => {
+      const node = this.nodes[i + 2];
+      node.quaternion.copy(node.rest).multiply(turn.setFromAxisAngle(node.axis, q[7 + i]));
+    });
+    const visible = !this.track.ghost || $("ghosts").checked;
+    this.group.visible = visible;
+    this.showForces(row);
+    this.trails.forEach((line, leg) => {
+      line.visible = $("trails").checked;
+      const position = line.geometry.attributes.position;
+      const count = Math.min(past.length, position.count);
+      for (let i = 0; i < count; i++) {
+        const feet = past[past.length - count + i];
+        position.setXYZ(i, feet[3 * leg], feet[3 * leg + 1],
+                        feet[3 * leg + 2] - this.robot.footRadius + 0.003);
+      }
+      position.needsUpdate = true;
+      line.geometry.setDrawRange(0, count);
+    });
+    this.paint(row);
+  }
+
+  showForces(row) {
+    const up = new THREE.Vector3(0, 0, 1), force = new THREE.Vector3();
+    this.robot.legs.forEach((leg, i) => {
+      if (!row.forces) return;
+      force.fromArray(row.forces, 3 * i);
+      const size = force.length(), acts = size > LEAST_FORCE;  // false for NaN too
+      for (const [objects, box] of [[this.arrows, "arrows"], [this.cones, "cones"]]) {
+        if (!objects.length) continue;
+        objects[i].visible = acts && $(box).checked;
+        objects[i].position.fromArray(row.feet, 3 * i);
+        objects[i].position.z -= this.robot.footRadius;
+      }
+      if (acts) {
+        const arrow = this.arrows[i];
+        arrow.scale.set(1, 1, this.film.forceScale * size);
+        arrow.quaternion.setFromUnitVectors(up, force.divideScalar(size));
+      }
+    });
+  }
+
+  // Colour the parts by what their joint does.
+  paint(row) {
+    const by = this.track.ghost ? "" : $("colour").value, values = row[by];
+    const end = by === "torque" ? this.film.useScale : this.film.errorScale;
+    for (const {mesh, joint, plain} of this.parts) {
+      let value = values && joint >= 0 ? Math.abs(values[joint]) / end : NaN;
+      if (by === "torque") value /= this.robot.torqueLimits[joint];
+      const color = Number.isNaN(value) ? null
+        : this.robot.scale[Math.min(31, Math.floor(32 * value))];
+      if (color) mesh.material.color.set(color); else mesh.material.color.copy(plain);
+    }
+  }
+
+  remove() {
+    this.group.parent.remove(this.group);
+    this.parts.forEach(({mesh}) => mesh.material.dispose());
+    this.trails.forEach((line) => line.geometry.dispose());
+  }
+}
+
+function coneMesh(friction) {
+  const height = 0.1;
+  const geometry = new THREE.ConeGeometry(friction * height, height, 32, 1, true);
+  geometry.translate(0, -height / 2, 0).rotateX(-Math.PI / 2);  // its tip at 0, opening along z
+  return new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({
+    color: CONE_COLOR, transparent: true, opacity: 0.25, side: THREE.DoubleSide,
+    depthWrite: false,
+  }));
+}
+
+// --- surroundings ---------------------------------------------------------------------------
+
+function groundMesh() {
+  const tiles = 28, colors = [0xebebe8, 0xc2c4c9].map((c) => new THREE.Color(c));
+  const geometry = new THREE.PlaneGeometry(tiles * TILE, tiles * TILE, tiles, tiles).toNonIndexed();
+  const paint = new Float32Array(3 * geometry.attributes.position.count);
+  for (let i = 0; i < tiles * tiles * 6; i++) {
+    const tile = Math.floor(i / 6), odd = (tile % tiles + Math.floor(tile / tiles)) % 2;
+    colors[odd].toArray(paint, 3 * i);
+  }
+  geometry.setAttribute("color", new THREE.BufferAttribute(paint, 3));
+  const ground = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({vertexColors: true}));
+  ground.receiveShadow = true;
+  return ground;
+}
+
+function surroundings(viewer) {
+  for (const path of ["/Grid", "/Axes", "/Lights/PointLightNegativeX",
+                      "/Lights/PointLightPositiveX"]) {
+    viewer.set_property(path.split("/").slice(1), "visible", false);
+  }
+  viewer.set_property(["Background"], "top_color", [0.86, 0.90, 0.94]);
+  viewer.set_property(["Background"], "bottom_color", [0.97, 0.97, 0.96]);
+  viewer.set_property(["Lights", "AmbientLight", "<object>"], "intensity", 0.4);
+  viewer.set_property(["Lights", "FillLight", "<object>"], "intensity", 0.3);
+  // A sun that throws shadows: what tells a robot in the air from one on the ground.
+  const sun = new THREE.DirectionalLight(0xffffff, 0.5);
+  sun.position.set(0.6, -1.2, 3.0);
+  sun.castShadow = true;
+  sun.shadow.mapSize.set(2048, 2048);
+  sun.shadow.bias = -0.001;
+  Object.assign(sun.shadow.camera, {left: -1.8, right: 1.8, top: 1.8, bottom: -1.8, near: 0.5,
+                                    far: 8.0});
+  viewer.scene.add(sun);
+}
+
+// --- plots ----------------------------------------------------------------------------------
+
+class Plot {
+  constructor(name, player) {
+    this.name = name; this.player = player;
+    this.canvas = $(`${name}-plot`);
+    this.picture = document.createElement("canvas");
+    this.canvas.addEventListener("pointerdown", (event) => this.seek(event));
+    this.canvas.addEventListener("pointermove", (event) => event.buttons && this.seek(event));
+  }
+
+  seek(event) {
+    const {duration} = this.player, width = this.canvas.clientWidth;
+    this.player.seek(duration * (event.offsetX - 40) / (width - 46));
+  }
+
+  // Draw the curves, which stay; `mark` draws the line that moves.
+  draw() {
+    const {film, duration} = this.player, joint = Number($("joint").value);
+    const tracks = film.tracks.filter((track) => track[this.name] && !track.ghost);
+    for (const id of ["plot", "name"]) $(`${this.name}-${id}`).hidden = !tracks.length;
+    const ratio = window.devicePixelRatio, width = this.canvas.clientWidth;
+    const height = this.canvas.clientHeight;
+    if (!tracks.length || !width) return;
+    for (const canvas of [this.canvas, this.picture]) {
+      canvas.width = width * ratio; canvas.height = height * ratio;
+    }
+    let low = 0, high = 0;
+    for (const track of tracks) {
+      const {values, rows, columns} = track[this.name];
+      for (let r = 0; r < rows; r++) {
+        const value = values[r * columns + joint];
+        if (value < low) low = value;
+        if (value > high) high = value;
+      }
+    }
+    const step = niceStep((high - low) / 4 || 1);
+    low = Math.floor(low / step) * step; high = Math.ceil(high / step) * step || step;
+    const x = (t) => 40 + (width - 46) * t / duration;
+    const y = (v) => 6 + (height - 26) * (high - v) / (high - low);
+    const pen = this.picture.getContext("2d");
+    pen.scale(ratio, ratio);
+    pen.font = "11px system-ui, sans-serif"; pen.fillStyle = "#555"; pen.strokeStyle = "#ddd";
+    pen.textAlign = "right"; pen.textBaseline = "middle";
+    for (let v = low; v < high + step / 2; v += step) {
+      pen.fillText(String(Number(v.toPrecision(3))), 36, y(v));
+      line(pen, [[40, y(v)], [width - 6, y(v)]]);
+    }
+    pen.textAlign = "center";
+    const every = niceStep(duration / 4 || 1);
+    for (let t = 0; t <= duration; t += every) {
+      pen.fillText(`${Number(t.toPrecision(3))} s`, x(t), height - 8);
+    }
+    pen.lineWidth = 1.4;
+    for (const track of tracks) {
+      const {values, rows, columns} = track[this.name], points = [];
+      for (let r = 0; r < rows; r++) points.push([x(r / film.fps), y(values[r * columns + joint])]);
+      pen.strokeStyle = track.color || "#222";
+      line(pen, points);
+    }
+    this.x = x;
+  }
+
+  mark(time) {
+    const pen = this.canvas.getContext("2d"), {width, height} = this.canvas;
+    if (!this.x || !width) return;
+    pen.clearRect(0, 0, width, height);
+    pen.drawImage(this.picture, 0, 0);
+    pen.strokeStyle = "#0072b2"; pen.lineWidth = 1.5 * window.devicePixelRatio;
+    const x = this.x(time) * window.devicePixelRatio;
+    line(pen, [[x, 0], [x, height - 20 * window.devicePixelRatio]]);
+  }
+}
+
+function line(pen, points) {
+  pen.beginPath();
+  let drawing = false;
+  for (const [x, y] of points) {
+    if (Number.isNaN(y)) { drawing = false; continue; }
+    if (drawing) pen.lineTo(x, y); else pen.moveTo(x, y);
+    drawing = true;
+  }
+  pen.stroke();
+}
+
+function niceStep(rough) {
+  const unit = 10 ** Math.floor(Math.log10(rough));
+  return unit * [1, 2, 5, 10].find((k) => k * unit >= rough);
+}
+
+// --- the player -----------------------------------------------------------------------------
+
+class Player {
+  // source: robot (bytes), options, first, film(choice): a promise of bytes.
+  static async start(source) {
+    const player = new Player(source);
+    const robot = await unpack(source.robot);
+    robot.geometries = robot.meshes.map(meshGeometry);
+    player.robot = robot;
+    robot.jointNames.forEach((name, i) => $("joint").add(new Option(name, i)));
+    $("joint").value = robot.shown;
+    await player.load();
+    const moment = /^#t=([0-9.]+)/.exec(location.hash);
+    if (moment) { player.pause(); player.seek(parseFloat(moment[1])); }
+    player.tick(performance.now());
+    return player;
+  }
+
+  constructor(source) {
+    this.source = source;
+    this.viewer = new MeshCat.Viewer($("pane"), false);
+    this.viewer.gui.domElement.style.display = "none";
+    this.viewer.set_3d_pane_size = () => this.fit();
+    surroundings(this.viewer);
+    this.ground = groundMesh();
+    this.world = new THREE.Group();
+    this.viewer.scene.add(this.ground, this.world);
+    this.figures = []; this.drawn = 0; this.time = 0; this.playing = true; this.ready = false;
+    this.plots = ["error", "torque"].map((name) => new Plot(name, this));
+    this.controls();
+  }
+
+  fit() {
+    const {clientWidth: width, clientHeight: height} = $("pane");
+    this.viewer.camera.aspect = width / height;
+    this.viewer.camera.updateProjectionMatrix();
+    this.viewer.renderer.setSize(width, height);
+    if (this.film) this.plots.forEach((plot) => plot.draw());
+    this.dirty = true;
+  }
+
+  controls() {
+    for (const [name, values] of Object.entries(this.source.options)) {
+      const label = document.createElement("label"), select = document.createElement("select");
+      label.innerHTML = "<span></span>";
+      label.firstChild.textContent = name;
+      select.id = `option-${name.replaceAll(" ", "-")}`;
+      values.forEach((value) => select.add(new Option(value, value)));
+      select.value = this.source.first[name];
+      select.dataset.option = name;
+      select.addEventListener("change", () => this.load());
+      label.append(select);
+      $("options").append(label);
+    }
+    $("play").addEventListener("click", () => this.playing ? this.pause() : this.play());
+    $("scrub").addEventListener("input", () => { this.pause(); this.seek(+$("scrub").value); });
+    $("stride").addEventListener("change", () => this.seek(+$("stride").value));
+    $("joint").addEventListener("change", () => { this.fit(); });
+    for (const id of ["ghosts", "arrows", "trails", "cones", "colour"]) {
+      $(id).addEventListener("change", () => { this.legend(); this.dirty = true; });
+    }
+    document.addEventListener("keydown", (event) => {
+      if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName)) return;
+      if (event.key === " ") { event.preventDefault(); $("play").click(); }
+      if (event.key === "ArrowLeft") { this.pause(); this.seek(this.time - 0.01); }
+      if (event.key === "ArrowRight") { this.pause(); this.seek(this.time + 0.01); }
+    });
+    window.addEventListener("resize", () => this.fit());
+    this.viewer.controls.addEventListener("change", () => { this.dirty = true; });
+  }
+
+  get choice() {
+    const selects = [...$("options").querySelectorAll("select")];
+    return Object.fromEntries(selects.map((select) => [select.dataset.option, select.value]));
+  }
+
+  // Load the film that the options choose; the clock runs on, so that films can be compared.
+  async load() {
+    const order = this.loading = (this.loading || 0) + 1;
+    let film;
+    try {
+      film = await unpack(await this.source.film(this.choice));
+    } catch (error) {
+      $("state").textContent = error.message;
+      return;
+    }
+    if (order !== this.loading) return;  // another was chosen meanwhile
+    $("state").textContent = "";
+    this.show(film);
+  }
+
+  show(film) {
+    this.figures.forEach((figure) => figure.remove());
+    const first = !this.film;
+    this.film = film;
+    this.duration = (film.view.rows - 1) / film.fps;
+    this.figures = film.tracks.map((track) => new Figure(this.robot, track, film, this.world));
+    document.title = $("title").textContent = film.title || "pronk_pin";
+    $("caption").textContent = film.caption;
+    const still = this.duration === 0;
+    for (const id of ["play", "scrub", "clock", "rate"]) $(id).hidden = still;
+    $("scrub").max = this.duration;
+    this.fillStrides();
+    for (const name of ["error", "torque"]) {
+      const known = film[name === "error" ? "errorScale" : "useScale"] !== null;
+      $("colour").querySelector(`[value=${name}]`).disabled = !known;
+      if (!known && $("colour").value === name) $("colour").value = "";
+    }
+    const holds = (channel) => film.tracks.some((track) => track.channels.includes(channel));
+    $("ghosts").parentElement.hidden = !film.tracks.some((track) => track.ghost);
+    $("arrows").parentElement.hidden = !holds("forces");
+    $("cones").parentElement.hidden = !holds("forces") || !film.friction;
+    $("plots").hidden = !holds("error") && !holds("torque");
+    this.legend();
+    if (first) this.look();
+    this.fit();
+    this.seek(this.time);
+  }
+
+  // From the robots' right front; MeshCat's camera has y up.
+  look() {
+    const solid = this.film.tracks.filter((track) => !track.ghost).length;
+    const far = 1 + 0.45 * (solid - 1);
+    this.viewer.camera.position.set(0.55 * far, 0.45 * far, 0.85 * far);
+    this.viewer.camera.fov = 50;
+    this.viewer.controls.target.set(0, 0.2, 0);
+  }
+
+  get leader() { return this.film.tracks.find((track) => !track.ghost) || this.film.tracks[0]; }
+
+  fillStrides() {
+    const strides = new Map();
+    for (const [t, stride] of this.leader.marks) {
+      if (!strides.has(stride)) strides.set(stride, t - this.film.start);
+    }
+    $("stride").replaceChildren(...[...strides].map(([k, t]) => new Option(k, t)));
+    $("stride").parentElement.hidden = strides.size < 2;
+  }
+
+  legend() {
+    const trunk = this.robot.parts.find((part) => part.joint === 1);
+    const entry = (color, ...texts) => {
+      const item = document.createElement("li");
+      item.innerHTML = "<i></i><b></b><span></span><span></span>";
+      item.firstChild.style.background = color;
+      texts.forEach((text, i) => { item.children[i + 1].textContent = text; });
+      return item;
+    };
+    this.words = new Map();  // of the tracks whose phase and stride are told
+    const ghosts = this.film.tracks.filter((track) => track.ghost);
+    const solid = this.film.tracks.filter((track) => !track.ghost);
+    const items = (solid.length ? solid : ghosts).map((track) => {
+      const item = entry(track.color || (trunk ? trunk.color : "#888"), track.name,
+                         track.caption ? `: ${track.caption}` : "");
+      this.words.set(track, item.children[3]);
+      return item;
+    });
+    if (ghosts.length && solid.length) {
+      items.push(entry(ghosts[0].color, ghosts.length > 1 ? "references" : ghosts[0].name,
+                       ghosts.length === 1 && ghosts[0].caption ? `: ${ghosts[0].caption}` : ""));
+    }
+    if (this.film.tracks.some((track) => track.channels.includes("forces"))) {
+      const newtons = Math.round(0.1 / this.film.forceScale);
+      const mean = this.film.forceWindow
+        ? `, mean over ${Math.round(1000 * this.film.forceWindow)} ms` : "";
+      items.push(entry("#d55e00", "", `ground reaction force, 0.1 m for ${newtons} N${mean}`));
+    }
+    $("tracks").replaceChildren(...items);
+    this.drawScale();
+  }
+
+  drawScale() {
+    const by = $("colour").value, bar = document.createElement("canvas");
+    $("scale").hidden = !by;
+    if (!by) return;
+    bar.width = 32; bar.height = 1;
+    this.robot.scale.forEach((color, i) => {
+      const pen = bar.getContext("2d");
+      pen.fillStyle = color; pen.fillRect(i, 0, 1, 1);
+    });
+    const end = by === "error" ? `${this.film.errorScale} rad`
+      : `${Math.round(100 * this.film.useScale)} % of the torque limit`;
+    $("scale").replaceChildren("0", bar, end);
+  }
+
+  colour(by) { $("colour").value = by; this.legend(); this.dirty = true; }
+  play() { this.playing = true; $("play").textContent = "Pause"; }
+  pause() { this.playing = false; $("play").textContent = "Play"; }
+
+  seek(time) {
+    this.time = Math.min(Math.max(time, 0), this.duration);
+    this.dirty = true;
+  }
+
+  // Values of a packed array at a frame, between two rows.
+  static sample({values, rows, columns}, frame) {
+    const before = Math.min(Math.floor(frame), rows - 1), after = Math.min(before + 1, rows - 1);
+    const w = Math.min(frame - before, 1), row = new Float32Array(columns);
+    for (let c = 0; c < columns; c++) {
+      const a = values[before * columns + c], b = values[after * columns + c];
+      row[c] = w === 0 ? a : a + w * (b - a);
+    }
+    return row;
+  }
+
+  draw() {
+    const frame = this.time * this.film.fps;
+    const view = Player.sample(this.film.view, frame);
+    this.figures.forEach((figure) => {
+      const {track} = figure;
+      const row = {q: Player.sample(track.q, frame), feet: Player.sample(track.feet, frame)};
+      for (const channel of track.channels) row[channel] = Player.sample(track[channel], frame);
+      const past = [], first = Math.max(0, Math.ceil(frame - TRAIL_SECONDS * this.film.fps));
+      for (let k = first; k <= frame; k++) past.push(Player.sample(track.feet, k));
+      past.push(row.feet);
+      figure.show(row, past);
+    });
+    this.place(view);
+    $("scrub").value = this.time;
+    $("clock").textContent = `${this.time.toFixed(2)} / ${this.duration.toFixed(2)} s`;
+    this.status();
+    this.plots.forEach((plot) => plot.mark(this.time));
+  }
+
+  // An instant that the stream sends: 32-bit floats, see documents.row_bytes.
+  stream(buffer) {
+    const values = new Float32Array(buffer);
+    let at = 0;
+    const take = (count) => values.subarray(at, at += count);
+    const view = take(2);
+    this.pause();
+    this.figures.forEach((figure) => {
+      const {track} = figure, row = {};
+      for (const key of ["q", "feet", ...track.channels]) row[key] = take(track[key].columns);
+      figure.past = [...(figure.past || []), row.feet].slice(-40);
+      figure.show(row, figure.past);
+    });
+    this.place(view);
+    this.received = (this.received || 0) + 1;
+    this.dirty = false; this.rendering = true;
+  }
+
+  place(view) {
+    this.world.position.set(-view[0], -view[1], 0);
+    const wrap = (x) => -(x - 2 * TILE * Math.floor(x / (2 * TILE)));
+    this.ground.position.set(wrap(view[0]), wrap(view[1]), 0);
+  }
+
+  // Phase and stride of each robot, on the screen.
+  status() {
+    const now = this.time + this.film.start + 1e-9;
+    this.words.forEach((words, track) => {
+      let mark = null;
+      for (const entry of track.marks) { if (entry[0] > now) break; mark = entry; }
+      words.textContent = mark ? ` - stride ${mark[1]}, ${mark[2]}` : "";
+      if (mark && track === this.leader && document.activeElement !== $("stride")) {
+        for (const option of $("stride").options) {
+          if (option.text === String(mark[1])) $("stride").value = option.value;
+        }
+      }
+    });
+  }
+
+  // One frame of the screen; the clock is the wall's, so that a slow screen leaves frames out.
+  tick(now) {
+    requestAnimationFrame((next) => this.tick(next));
+    const elapsed = Math.min((now - (this.last || now)) / 1000, 0.5);
+    this.last = now;
+    if (!this.film) return;
+    if (this.playing && this.duration > 0) {
+      this.time = (this.time + elapsed * $("rate").value) % this.duration;
+      this.dirty = true;
+    }
+    if (this.dirty) { this.draw(); this.rendering = true; }
+    if (this.rendering || this.viewer.controls.enableDamping) {
+      this.viewer.render();
+      this.drawn += 1;
+      this.ready = true;
+    }
+    this.dirty = this.rendering = false;
+  }
+}
