@@ -100,9 +100,9 @@ class TickLog:
             self.missing[rows, ticks],
             length,
             felt,
-            self.force[rows, ticks, :, 2].sum(axis=-1),
-            self.pose[rows, ticks],
-            self.twist[rows, ticks],
+            load=self.force[rows, ticks, :, 2].sum(axis=-1),
+            pose=self.pose[rows, ticks],
+            twist=self.twist[rows, ticks],
         )
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
