@@ -102,7 +102,7 @@ def _merge_impossible_inertias(root: ElementTree.Element) -> None:
     links = {link.get("name", ""): link for link in root.findall("link")}
     fixed = [joint for joint in map(_Joint, root.findall("joint")) if joint.fixed]
     for name, link in links.items():
-        inertia = _inertia(link)
+        inertia = link_inertia(link)
         if inertia is None or _is_possible(inertia):
             continue
         up = next((joint for joint in fixed if joint.child == name), None)
@@ -113,9 +113,9 @@ def _merge_impossible_inertias(root: ElementTree.Element) -> None:
             neighbour, moved = links[down.child], down.placement.actInv(inertia)
         else:
             continue  # a link that moves by itself: MuJoCo's complaint names it
-        other = _inertia(neighbour)
-        _set_inertia(neighbour, moved if other is None else moved + other)
-        _set_inertia(link, None)
+        other = link_inertia(neighbour)
+        set_link_inertia(neighbour, moved if other is None else moved + other)
+        set_link_inertia(link, None)
 
 
 def _is_possible(inertia: pin.Inertia) -> bool:
@@ -126,7 +126,7 @@ def _is_possible(inertia: pin.Inertia) -> bool:
     return bool(moments[0] > 1e-14 and moments[0] + moments[1] >= moments[2])
 
 
-def _inertia(link: ElementTree.Element) -> pin.Inertia | None:
+def link_inertia(link: ElementTree.Element) -> pin.Inertia | None:
     """A link's inertia in the link's frame."""
     inertial = link.find("inertial")
     mass = None if inertial is None else inertial.find("mass")
@@ -144,7 +144,7 @@ def _inertia(link: ElementTree.Element) -> pin.Inertia | None:
     return _placement(inertial).act(own)
 
 
-def _set_inertia(link: ElementTree.Element, inertia: pin.Inertia | None) -> None:
+def set_link_inertia(link: ElementTree.Element, inertia: pin.Inertia | None) -> None:
     before = link.find("inertial")
     if before is not None:
         link.remove(before)

@@ -157,7 +157,7 @@ class GaitNotFound(PronkError):
 
 
 class WorkerLost(PronkError):
-    """A worker process ended in the middle of its work, for want of memory perhaps.
+    """Workers ended in the middle of their work again and again, for want of memory perhaps.
 
     Attributes:
         folder: The folder that holds what was finished.
@@ -166,9 +166,22 @@ class WorkerLost(PronkError):
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         super().__init__(
-            "a worker process ended unexpectedly; run the same command again with "
-            f"'--folder {folder} --workers 1' to complete what is missing"
+            "workers ended unexpectedly, for want of memory perhaps; what was finished is kept: "
+            f"run the same command again with '--folder {folder} --workers 1' to complete it"
         )
+
+
+class ExecutorUnavailable(PronkError):
+    """An executor beyond this machine that cannot be used.
+
+    Attributes:
+        address: Its address.
+        problem: What is wrong with it.
+    """
+
+    def __init__(self, address: str, problem: str, remedy: str) -> None:
+        self.address, self.problem = address, problem
+        super().__init__(f"{address}: {problem}; {remedy}")
 
 
 class PortUnavailable(PronkError):
@@ -187,3 +200,7 @@ class PortUnavailable(PronkError):
             f"{tried} of {host} cannot be used ({reason}); choose another with --port, "
             "or leave it out to get a free one"
         )
+
+
+class LeakyFilter(UserWarning):
+    """A learning filter whose DC gain is not 1: it loses, or adds, torque in each stride."""

@@ -12,15 +12,16 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
-from ._typing import Array
+from ._typing import Array, IntArray
 from .errors import FileProblem, InvalidInput, UnknownName
+from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
 
 JOINTS = ("hip", "thigh", "calf")
 """Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
@@ -127,6 +128,8 @@ class Robot:
         model: Pinocchio's model with a floating base; treat it as read-only.
         foot_radius: Radius of the spherical feet [m].
         urdf_joint_names: The joints in the order of the URDF document, which is MuJoCo's order.
+        parameters: What the model says beyond the URDF, see `with_parameters`.
+        bare: The robot without its parameters; None where it has none.
     """
 
     spec: RobotSpec
@@ -135,6 +138,23 @@ class Robot:
     model: pin.Model
     foot_radius: float
     urdf_joint_names: tuple[str, ...]
+    parameters: ModelParameters = NOTHING
+    bare: Robot | None = field(default=None, repr=False)
+
+    def with_parameters(self, parameters: ModelParameters) -> Robot:
+        """The robot with rotors, friction, motors and load that its URDF leaves out.
+
+        Dynamics, inverse dynamics, impacts and gait optimisation of the robot that comes out use
+        them; parameters that this robot has already are replaced. A simulated `World` does not:
+        what is true there is the scenario's to say.
+
+        Args:
+            parameters: The parameters.
+
+        Raises:
+            InvalidInput: Parameters of another number of joints, or a trunk without mass.
+        """
+        return _mended(self.bare or self, parameters)
 
     @property
     def name(self) -> str:
@@ -219,6 +239,45 @@ class Robot:
         return float(-self.model.gravity.linear[2])
 
     @cached_property
+    def joint_kinds(self) -> IntArray:
+        """For each joint its place in the leg, 0 for a hip; -1 for joints of no leg, (12,)."""
+        kinds = {
+            name: kind for leg in self.legs for kind, name in enumerate(self.spec.leg_joints(leg))
+        }
+        return np.array([kinds.get(name, -1) for name in self.joint_names], dtype=np.intp)
+
+    def of_joint(self, name: str) -> Array:
+        """A parameter out of `armature`, `damping` and `coulomb`, by joint, shape (12,)."""
+        return self.parameters.of_joint(name, self.joint_kinds, len(self.spec.joints))
+
+    def friction(self, rates: Array) -> Array:
+        """What rubs against joint velocities (..., 12) [rad/s], shape (..., 12) [N m]."""
+        sliding = np.tanh(rates / SLIDING)
+        return np.asarray(self.of_joint("damping") * rates + self.of_joint("coulomb") * sliding)
+
+    def friction_rate(self, rates: Array) -> Array:
+        """Derivative of `friction` by the joint velocities, shape (..., 12) [N m s/rad]."""
+        slope = 1.0 / (SLIDING * np.cosh(np.clip(rates / SLIDING, -300.0, 300.0)) ** 2)
+        return np.asarray(self.of_joint("damping") + self.of_joint("coulomb") * slope)
+
+    def joint_torques(self, tau: Array, rates: Array) -> Array:
+        """Torques that move the joints, from those that the motors are asked for.
+
+        Args:
+            tau: Motor torques [N m], shape (..., 12).
+            rates: Joint velocities [rad/s], shape (..., 12).
+        """
+        if self.parameters.ideal_motors:
+            return tau
+        return np.asarray(self.parameters.torque_constant * tau - self.friction(rates))
+
+    def motor_torques(self, torques: Array, rates: Array) -> Array:
+        """Torques to ask the motors for: the inverse of `joint_torques`."""
+        if self.parameters.ideal_motors:
+            return torques
+        return np.asarray((torques + self.friction(rates)) / self.parameters.torque_constant)
+
+    @cached_property
     def standing(self) -> Array:
         """Standing posture with the feet on the ground z = 0, shape (19,)."""
         q, names = pin.neutral(self.model), self.spec.joint_names
@@ -231,8 +290,11 @@ class Robot:
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the URDF; results and gaits carry it."""
-        return hashlib.sha256(self.urdf_path.read_bytes()).hexdigest()
+        """SHA-256 of the URDF, and of the parameters if any; results and gaits carry it."""
+        document = self.urdf_path.read_bytes()
+        if self.parameters != NOTHING:
+            document += repr(self.parameters).encode()
+        return hashlib.sha256(document).hexdigest()
 
     def q_from_base(self, position: Array, joints: Array, *, pitch: Array | float = 0.0) -> Array:
         """Configuration from the trunk's position, its pitch and the joints; batched.
@@ -290,6 +352,18 @@ def _load(spec: RobotSpec) -> Robot:
         foot_radius=radius,
         urdf_joint_names=tuple(name for name in order if name in joints),
     )
+
+
+@lru_cache(maxsize=32)
+def _mended(bare: Robot, parameters: ModelParameters) -> Robot:
+    if parameters == NOTHING:
+        return bare
+    model = bare.model.copy()
+    robot = replace(bare, model=model, parameters=parameters, bare=bare)
+    by_joint = {name: robot.of_joint(name) for name in BY_JOINT}  # complains of a wrong number
+    model.armature = model.armature + np.concatenate([np.zeros(NB), by_joint["armature"]])
+    model.inertias[1] = loaded(model.inertias[1], parameters)
+    return robot
 
 
 def _check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:

@@ -38,7 +38,10 @@ def failure(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_compare_writes_everything_it_names(result: Path) -> None:
     names = {path.name for path in result.iterdir()}
-    assert names == {"config.json", "replay.html", "report.html", "strides", "summary.csv"}
+    assert names == {
+        *("config.json", "provenance.json", "summary.csv", "strides"),
+        *("report.html", "replay.html"),
+    }
     assert {path.name for path in (result / "strides").iterdir()} == {
         "pd_nominal_0.nc",
         "ilc_nominal_0.nc",
@@ -71,8 +74,7 @@ def test_one_speed_and_one_controller_are_a_comparison_too(
     assert "1 of 1" in capsys.readouterr().out
     assert main(["report", str(tmp_path / "one"), "--figures", str(tmp_path / "figures")]) == 0
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {
-        "errors.svg",
-        "learning.svg",
+        f"{name}.{suffix}" for name in ("errors", "learning") for suffix in ("svg", "pdf")
     }
 
 

@@ -44,7 +44,7 @@ def test_examples_are_short() -> None:
 def test_commands_are_understood(monkeypatch: pytest.MonkeyPatch) -> None:
     commands = re.findall(r"^pronk-pin ([^#\n]*)", README, flags=re.MULTILINE)
     assert len(commands) >= 5
-    for kind in (cli.Compare, cli.View, cli.Report, cli.Gaits, cli.Parity):
+    for kind in (cli.Compare, cli.View, cli.Report, cli.Explain, cli.Gaits, cli.Parity):
         monkeypatch.setattr(kind, "run", lambda self: None)
     for command in commands:
         assert cli.main(shlex.split(command)) == 0, command

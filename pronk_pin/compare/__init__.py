@@ -1,6 +1,7 @@
 """What happens, and what it says: worlds, simulations, experiments, metrics, results."""
 
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
+from .explanation import Explanation, describe, explain
 from .foreign import mjcf_parity, mjcf_spec
 from .metrics import reduction, steady, summarize
 from .mismatch import KNOWN, MISMATCHES, Mismatch
@@ -18,6 +19,7 @@ __all__ = [
     "SCENARIOS",
     "Cell",
     "Experiment",
+    "Explanation",
     "Mismatch",
     "Results",
     "Scenario",
@@ -28,6 +30,8 @@ __all__ = [
     "World",
     "build_model",
     "default_folder",
+    "describe",
+    "explain",
     "load_scenario",
     "mjcf_parity",
     "mjcf_spec",

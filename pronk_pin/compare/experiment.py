@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,15 +20,22 @@ from .._typing import Array
 from ..control import BASES, ControllerSpec, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
-from ..gait import SPEEDS, GaitLibrary, load_library
-from ..robot import load_robot
+from ..gait import SPEEDS, Gait, GaitLibrary, load_library
+from ..robot import Robot, load_robot
+from .explanation import explain, mended_gaits
 from .foreign import mjcf_spec
 from .metrics import steady
 from .scenario import load_scenario
 from .simulate import Progress, Schedule, Simulation
 from .strides import to_dataset
 
+LEARNED = ("library", "identified")
+"""Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
+
 DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
+
+PRACTISED = ("count", "learning", "feedforward")
+"""What of a practised cell's strides the torque library is made of."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +79,11 @@ class Experiment:
         for speed in self.speeds:
             library.at(speed)
         for controller in self.controllers:
-            load_controller(controller)
+            if load_controller(controller).source == "identified" and self.base != "locked":
+                raise InvalidInput(
+                    f"controller '{controller}' identifies the robot on the locked base; leave it "
+                    "out, or use base 'locked'"
+                )
         if min(self.seeds) < 0:
             raise InvalidInput("seeds must not be negative")
         if self.world:
@@ -82,9 +94,10 @@ class Experiment:
     def cells(self) -> tuple[Cell, ...]:
         """The simulations, in an order in which each finds what it depends on done before it."""
         controllers = list(self.controllers)
-        if "library" in controllers:
-            controllers = ["ilc", *(c for c in controllers if c not in ("ilc", "library"))]
-            controllers.append("library")
+        later = [name for name in controllers if load_controller(name).source in LEARNED]
+        if later:
+            others = [name for name in controllers if name not in ("ilc", *later)]
+            controllers = ["ilc", *others, *later]
         return tuple(
             Cell(
                 self.robot,
@@ -122,8 +135,8 @@ class Cell:
 
     @property
     def practised(self) -> Cell | None:
-        """The cell in which the torque library is learned, for a cell that replays it."""
-        if load_controller(self.controller).source != "library":
+        """The cell that learns what this one uses: the torque library, or the mended model."""
+        if load_controller(self.controller).source not in LEARNED:
             return None
         return dataclasses.replace(self, controller="ilc")
 
@@ -150,6 +163,10 @@ def run_cell(
     robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.world)
     library, spec = _gaits(cell.robot, cell.base), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]
+    mended = robot
+    if spec.source == "identified":
+        mended = explain(_learned(spec, practised)).mended
+        gaits = mended_gaits(mended, gaits) if spec.mended_gaits else gaits
     # One stream a seed, the same for every controller: they start from the same postures.
     rng = np.random.default_rng(np.random.SeedSequence(cell.seed))
     simulation = Simulation(
@@ -159,7 +176,7 @@ def run_cell(
         scenario,
         schedule=cell.schedule,
         rng=rng,
-        feedforward=_feedforward(spec, cell, practised),
+        feedforward=_feedforward(spec, mended, gaits, practised, cell.base),
         base=cell.base,
     )
     log = simulation.run(progress)
@@ -178,21 +195,30 @@ def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     return TorqueLibrary.from_strides(strides["speed"].to_numpy(), torque.to_numpy())
 
 
-def _feedforward(spec: ControllerSpec, cell: Cell, practised: xr.Dataset | None) -> Array | None:
+def _feedforward(
+    spec: ControllerSpec,
+    robot: Robot,
+    gaits: Sequence[Gait],
+    practised: xr.Dataset | None,
+    base: str,
+) -> Array | None:
     """The feedforward that a controller begins with [N m], (n, 2, samples, 12)."""
-    if spec.source == "model":
-        library = _gaits(cell.robot, cell.base)
-        gaits = [library.at(speed) for speed in cell.speeds]
-        return model_feedforward(load_robot(cell.robot), gaits, base=cell.base)
+    if spec.source in ("model", "identified"):
+        return model_feedforward(robot, gaits, base=base)
     if spec.source == "library":
-        if practised is None:
-            raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
-        return torque_library(practised).at(np.asarray(cell.speeds))
+        learned = torque_library(_learned(spec, practised))
+        return learned.at(np.array([gait.speed for gait in gaits]))
     return None
 
 
+def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
+    if practised is None:
+        raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
+    return practised
+
+
 def _attributes(cell: Cell) -> dict[str, str | int | float]:
-    scenario = dataclasses.asdict(load_scenario(cell.scenario, mjcf=cell.world))
+    scenario = load_scenario(cell.scenario, mjcf=cell.world)
     world = hashlib.sha256(Path(cell.world).read_bytes()).hexdigest() if cell.world else ""
     return {
         "robot": cell.robot,
@@ -200,8 +226,8 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "scenario": cell.scenario,
         "controller": cell.controller,
         "seed": cell.seed,
-        "scenario_parameters": repr(scenario),
+        "scenario_parameters": scenario.to_json(),
         "world": cell.world,
         "world_sha256": world,
-        "timestep": scenario["timestep"],
+        "timestep": scenario.timestep,
     }

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from .._typing import Array
+from .._typing import Array, BoolArray
 from ..robot import JOINTS
+from .effort import effort
 
 STEADY_STRIDES = 30
 """Strides at the end of a simulation that count as steady state (paper, section III.B)."""
@@ -37,8 +39,10 @@ def steady(strides: xr.Dataset) -> xr.Dataset:
 
 def by_joint(values: xr.DataArray) -> xr.DataArray:
     """Mean over the four legs: the axis `joint` of twelve becomes one of hip, thigh, calf."""
-    kind = [str(name).split("_")[1] for name in values["joint"].to_numpy()]
-    return values.assign_coords(joint=kind).groupby("joint").mean().sel(joint=list(JOINTS))
+    kinds = np.array([str(name).split("_")[1] for name in values["joint"].to_numpy()])
+    means = [values.isel(joint=np.flatnonzero(kinds == kind)).mean("joint") for kind in JOINTS]
+    joined = xr.concat(means, dim="joint", coords="minimal", compat="override")
+    return joined.assign_coords(joint=list(JOINTS)).transpose(*values.dims)
 
 
 def summarize(strides: xr.Dataset) -> pd.DataFrame:
@@ -49,60 +53,97 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
         rms_error: Its root mean square [rad].
         contact_error: The peak counted from the contact on, two ticks before it is felt [rad].
         strides_to_converge: See `strides_to_converge`; thigh and calf, and `-` for the later one.
+        strides_to_beat_model: See `compare.practice`; added where the model was run too.
     Per robot:
         upright: 1 if it never fell.
         speed_error, apex_error: Steady mean minus the gait's [m/s], [m].
         apex_deviation: Standard deviation of the apex over the steady strides [m].
         stride_duration: Mean duration of a stride [s].
         feedback_share: Feedback's share of the torque in stance, as root mean squares.
+        power, cost_of_transport: Mechanical, see `compare.effort`.
 
     Args:
         strides: What `Simulation` recorded, as `compare.results` stores it.
     """
     settings = {key: strides.attrs[key] for key in ("robot", "base", "scenario", "controller")}
     settings["seed"] = int(strides.attrs["seed"])
-    rows = [
-        {**settings, "speed": float(speed), **row}
-        for k, speed in enumerate(strides["speed"].to_numpy())
-        for row in _rows(strides, k)
-    ]
+    joints = by_joint(strides[["peak_error", "contact_error"]].to_dataarray("name"))
+    squares = by_joint(strides["rms_error"] ** 2)
+    per_joint = {
+        "peak_error": _array(joints.sel(name="peak_error"), "joint"),
+        "contact_error": _array(joints.sel(name="contact_error"), "joint"),
+        "rms_error": _array(squares, "joint"),
+    }
+    scalars = {
+        name: _array(strides[name])
+        for name in ("upright", "mean_speed", "apex", "duration", "learning")
+    }
+    stance = strides[["feedback", "feedforward"]].sel(part="stance")
+    torques = {str(name): _array(stance[name], "phase", "joint") for name in stance}
+    spent = effort(strides)
+    rows = []
+    for k, speed in enumerate(strides["speed"].to_numpy()):
+        count = int(strides["count"][k])
+        learning = scalars["learning"][k, :count] == 1
+        last = min(STEADY_STRIDES, int(learning.sum()) or count)
+        end = slice(count - last, count)
+        planned = {"mean_speed": speed, "apex": float(strides["planned_apex"][k])}
+        found = [
+            *_errors({name: values[k, end] for name, values in per_joint.items()}),
+            *_motion({name: values[k, end] for name, values in scalars.items()}, planned),
+            ("-", "feedback_share", _share(*(torques[name][k, end] for name in torques)), "1"),
+            *(("-", name, values[k], unit) for name, (values, unit) in spent.items()),
+            *_settling(per_joint["peak_error"][k, :count], learning),
+        ]
+        rows += [
+            {**settings, "speed": float(speed), **dict(zip(COLUMNS[-4:], row, strict=True))}
+            for row in found
+        ]
     return pd.DataFrame(rows)[COLUMNS].sort_values(KEYS, ignore_index=True)
 
 
-def _rows(strides: xr.Dataset, k: int) -> Iterator[dict[str, object]]:
-    """Rows of the robot number k."""
-    mine = strides.isel(speed=[k])
-    end = steady(mine).isel(speed=0)
+_Row: TypeAlias = tuple[str, str, float, str]
+"""Joint, metric, value, unit."""
 
-    def row(metric: str, value: object, unit: str, joint: str = "-") -> dict[str, object]:
-        return {"joint": joint, "metric": metric, "value": float(value), "unit": unit}  # type: ignore[arg-type]
 
-    peak = by_joint(end["peak_error"]).mean("stride")
-    rms = by_joint(end["rms_error"] ** 2).mean("stride") ** 0.5
-    contact = by_joint(end["contact_error"]).mean("stride")
-    for joint in JOINTS:
-        yield row("peak_error", peak.sel(joint=joint), "rad", joint)
-        yield row("rms_error", rms.sel(joint=joint), "rad", joint)
-        yield row("contact_error", contact.sel(joint=joint), "rad", joint)
-    yield row("upright", end["upright"].min(), "1")
-    yield row("speed_error", end["mean_speed"].mean() - end["speed"], "m/s")
-    yield row("apex_error", end["apex"].mean() - end["planned_apex"], "m")
-    yield row("apex_deviation", end["apex"].std(), "m")
-    yield row("stride_duration", end["duration"].mean(), "s")
-    yield row("feedback_share", feedback_share(end.sel(part="stance")), "1")
-    if bool((mine["learning"] == 1).any()):
-        settled = {joint: strides_to_converge(mine.isel(speed=0), joint) for joint in JOINTS[1:]}
-        for joint, count in settled.items():
-            yield row("strides_to_converge", count, "1", joint)
-        yield row("strides_to_converge", np.max(list(settled.values())), "1")
+def _array(values: xr.DataArray, *trailing: str) -> Array:
+    """Values as (speed, stride, ...)."""
+    return np.asarray(values.transpose("speed", "stride", *trailing).to_numpy())
+
+
+def _errors(end: Mapping[str, Array]) -> Iterator[_Row]:
+    """Errors of one robot from its steady strides, each (strides, 3)."""
+    for j, joint in enumerate(JOINTS):
+        yield joint, "peak_error", float(end["peak_error"][:, j].mean()), "rad"
+        yield joint, "rms_error", float(np.sqrt(end["rms_error"][:, j].mean())), "rad"
+        yield joint, "contact_error", float(end["contact_error"][:, j].mean()), "rad"
+
+
+def _motion(end: Mapping[str, Array], planned: Mapping[str, float]) -> Iterator[_Row]:
+    """How one robot moved in its steady strides, each (strides,)."""
+    yield "-", "upright", float(end["upright"].min()), "1"
+    yield "-", "speed_error", float(end["mean_speed"].mean() - planned["mean_speed"]), "m/s"
+    yield "-", "apex_error", float(end["apex"].mean() - planned["apex"]), "m"
+    yield "-", "apex_deviation", float(end["apex"].std()), "m"
+    yield "-", "stride_duration", float(end["duration"].mean()), "s"
+
+
+def _settling(peaks: Array, learning: BoolArray) -> Iterator[_Row]:
+    """When the learning of one robot has settled, from its peaks (strides, 3)."""
+    if learning.any():
+        counts = [_converged(peaks[:, j], learning) for j in range(1, len(JOINTS))]
+        for joint, count in zip((*JOINTS[1:], "-"), (*counts, np.max(counts)), strict=True):
+            yield joint, "strides_to_converge", float(count), "1"
 
 
 def feedback_share(strides: xr.Dataset) -> float:
     """RMS of the feedback torque over the sum of both RMS; NaN where there is no torque at all."""
-    feedback = float(np.sqrt((strides["feedback"] ** 2).mean()))
-    feedforward = float(np.sqrt((strides["feedforward"] ** 2).mean()))
-    total = feedback + feedforward
-    return feedback / total if total > 0.0 else float("nan")
+    return _share(strides["feedback"].to_numpy(), strides["feedforward"].to_numpy())
+
+
+def _share(feedback: Array, feedforward: Array) -> float:
+    one, other = (float(np.sqrt(np.nanmean(part**2))) for part in (feedback, feedforward))
+    return one / (one + other) if one + other > 0.0 else float("nan")
 
 
 def strides_to_converge(strides: xr.Dataset, joint: str) -> float:
@@ -116,9 +157,12 @@ def strides_to_converge(strides: xr.Dataset, joint: str) -> float:
         strides: The strides of one robot.
         joint: "thigh" or "calf".
     """
-    peak = by_joint(strides["peak_error"]).sel(joint=joint).to_numpy()
-    peak = peak[: int(strides["count"])]
-    learning = strides["learning"].to_numpy()[: len(peak)] == 1
+    count = int(strides["count"])
+    peak = by_joint(strides["peak_error"]).sel(joint=joint).to_numpy()[:count]
+    return _converged(peak, strides["learning"].to_numpy()[:count] == 1)
+
+
+def _converged(peak: Array, learning: BoolArray) -> float:
     start = int(np.argmax(learning))
     if start == 0:
         return float("nan")

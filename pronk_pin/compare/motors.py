@@ -43,7 +43,7 @@ class Motors:
     def _driven(self, torque: Array, rates: Array) -> Array:
         """Torques that drive, within what is left of them at speed."""
         full, none = self._scenario.full_torque_speed, self._scenario.no_load_speed
-        if none == np.inf:
+        if none is None:
             return torque
         limit = self._tau_max * np.clip((none - np.abs(rates)) / (none - full), 0.0, 1.0)
         return np.asarray(np.clip(torque, -limit, limit))

@@ -3,23 +3,27 @@
 =====================  ==================================================================
 file                   contents
 =====================  ==================================================================
-config.json            the experiment, versions, CPU, how long it took
+config.json            the experiment: who has it can make the rest again, to the bit
 strides/<cell>.nc      every stride of one simulation (NetCDF-4), see `compare.strides`
 summary.csv            one long table, see `compare.metrics`
-report.html            tables and figures, in one file
+provenance.json        versions, machine, state of the source, times: not the same twice
+report.html, .md       tables and figures
 replay.html            the robot beside the reference, in one file
 =====================  ==================================================================
+
+A file appears under its name only when it is whole; what a killed run leaves half written ends in
+`.partial`, and the next run clears it away.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import importlib.metadata
+import fcntl
 import json
 import os
-import platform
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -31,13 +35,15 @@ import xarray as xr
 from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, UnknownName, cannot_write
 from .experiment import Cell, Experiment
 from .metrics import COLUMNS, KEYS, summarize
+from .practice import practice, rows_of_beating
+from .provenance import versions
 from .simulate import Schedule
 
 SCHEMA = 2
 """Version of the layout of a results folder."""
 
-_PACKAGES = ("pronk-pin", "pin", "example-robot-data", "mujoco", "proxsuite", "numpy", "scipy")
 _AGAIN = "run 'pronk-pin compare' to make one"
+_ROOM = "make room, and run the same command again with --folder {folder}"
 _DAMAGE = (
     *(ValueError, KeyError, TypeError, AttributeError),
     *(InvalidInput, UnknownName, SpeedOutOfRange),
@@ -72,7 +78,8 @@ class Results:
         except OSError as error:
             raise cannot_write(folder, error, "choose a folder of yours with --folder") from error
         if not taken:
-            results.write_config({"finished": False})
+            config = {"schema": SCHEMA, "experiment": dataclasses.asdict(experiment)}
+            results.write("config.json", json.dumps(config, indent=2) + "\n")
         return results
 
     @classmethod
@@ -94,25 +101,65 @@ class Results:
         except _DAMAGE as error:
             raise FileProblem(path, f"damaged ({error})", _AGAIN) from error
 
-    @property
-    def config(self) -> Mapping[str, Any]:
-        """Everything in config.json."""
-        config: dict[str, Any] = json.loads((self.folder / "config.json").read_text())
-        return config
+    @contextlib.contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out of the folder, and clear away what a killed one left half written.
 
-    def write_config(self, provenance: Mapping[str, Any]) -> None:
-        """Write config.json: the experiment, the machine, and what else is to be known."""
-        config = {
-            "schema": SCHEMA,
-            "experiment": dataclasses.asdict(self.experiment),
-            "versions": {name: importlib.metadata.version(name) for name in _PACKAGES},
-            "python": platform.python_version(),
-            "platform": platform.platform(),
-            "cpu": cpu_name(),
-            "cores": os.cpu_count(),
-            **provenance,
-        }
-        _write(self.folder / "config.json", json.dumps(config, indent=2) + "\n")
+        The lock ends with the process, however it ends.
+
+        Raises:
+            FileProblem: Another run is at it.
+        """
+        handle = os.open(self.folder, os.O_RDONLY)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            for partial in [*self.folder.glob("*.partial"), *self.folder.glob("*/*.partial")]:
+                partial.unlink()
+            yield
+        except BlockingIOError as error:
+            raise FileProblem(
+                self.folder, "another run is writing there", "wait for it, or end it first"
+            ) from error
+        finally:
+            os.close(handle)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What provenance.json says: whether the run is `finished`, and its `runs`, first to last.
+
+        Raises:
+            FileProblem: It is damaged.
+        """
+        path = self.folder / "provenance.json"
+        if not path.is_file():
+            return {"finished": False, "runs": []}
+        try:
+            known = json.loads(path.read_text())
+            return {"finished": bool(known["finished"]), "runs": list(known["runs"])}
+        except _DAMAGE as error:
+            raise FileProblem(
+                path, f"damaged ({error})", "delete it: only the record of who made it is lost"
+            ) from error
+
+    def write_provenance(self, provenance: Mapping[str, Any]) -> None:
+        """Write provenance.json."""
+        self.write("provenance.json", json.dumps(provenance, indent=2) + "\n")
+
+    def check_versions(self) -> None:
+        """Refuse to complete a result that other versions have begun.
+
+        Raises:
+            FileProblem: A package that makes the numbers has another version than before.
+        """
+        for run in self.provenance["runs"][-1:]:
+            before, now = run.get("versions", {}), versions()
+            for name in sorted(before):
+                if before[name] != now.get(name):
+                    raise FileProblem(
+                        self.folder,
+                        f"was begun with {name} {before[name]}, and this is {now.get(name)}",
+                        "install that version again, or choose another folder",
+                    )
 
     def path(self, cell: Cell) -> Path:
         """The file of a cell's strides."""
@@ -122,26 +169,23 @@ class Results:
         """Whether the cell was simulated already; files appear only when they are whole."""
         return self.path(cell).exists()
 
-    def save(self, cell: Cell, strides: xr.Dataset) -> None:
-        """Write a cell's strides.
+    def save(self, cell: Cell, strides: xr.Dataset | bytes) -> None:
+        """Write a cell's strides, as a dataset or as `encode` has made them.
 
         Raises:
             FileProblem: The file cannot be written.
         """
-        path = self.path(cell)
-        partial = path.with_suffix(".partial")
-        packed = {"zlib": True, "complevel": 1, "shuffle": True}
-        encoding = {name: packed for name, v in strides.data_vars.items() if v.ndim > 2}
-        try:
-            strides.to_netcdf(partial, engine="netcdf4", encoding=encoding)
-            partial.replace(path)
-        except (OSError, RuntimeError) as error:
-            with contextlib.suppress(OSError):
-                partial.unlink()
-            raise cannot_write(path, error, "make room, and run the same command again") from error
+        self.write(
+            f"strides/{cell.name}.nc",
+            strides if isinstance(strides, bytes) else encode(strides),
+        )
 
-    def strides(self, cell: Cell) -> xr.Dataset:
+    def strides(self, cell: Cell, variables: Collection[str] | None = None) -> xr.Dataset:
         """The strides of a cell.
+
+        Args:
+            cell: Which simulation.
+            variables: Read these only, as far as there are such; by default everything.
 
         Raises:
             FileProblem: The file is missing or damaged.
@@ -150,7 +194,9 @@ class Results:
         if not path.is_file():
             raise FileProblem(path, "missing", "run the same 'pronk-pin compare --folder' again")
         try:
-            return xr.load_dataset(path, engine="netcdf4")
+            with xr.open_dataset(path, engine="netcdf4") as file:
+                wanted = file if variables is None else file[[v for v in variables if v in file]]
+                return wanted.load()
         except (OSError, ValueError, KeyError, RuntimeError) as error:
             raise FileProblem(
                 path, f"damaged ({error})", "delete it and run 'pronk-pin compare --folder' again"
@@ -167,9 +213,15 @@ class Results:
 
     def summarize(self) -> pd.DataFrame:
         """Compute the summary from the strides, and write summary.csv."""
-        tables = [summarize(self.strides(cell)) for cell in self.experiment.cells()]
-        summary = pd.concat(tables).sort_values(KEYS, ignore_index=True)[COLUMNS]
-        _write(self.folder / "summary.csv", summary.to_csv(index=False))
+        tables, practised = [], []
+        for cell in self.experiment.cells():
+            strides = self.strides(cell)
+            tables.append(summarize(strides))
+            practised.append(practice(strides))
+        tables.append(pd.DataFrame(rows_of_beating(practised), columns=COLUMNS))
+        full = [table for table in tables if len(table)]
+        summary = pd.concat(full).sort_values(KEYS, ignore_index=True)[COLUMNS]
+        self.write("summary.csv", summary.to_csv(index=False))
         return summary
 
     def summary(self) -> pd.DataFrame:
@@ -190,20 +242,47 @@ class Results:
             raise FileProblem(path, "damaged (other columns)", remedy)
         return summary
 
+    def write(self, name: str, contents: str | bytes) -> Path:
+        """Write a file of the folder, whole or not at all.
+
+        Raises:
+            FileProblem: It cannot be written; what was there before is still there.
+        """
+        path = self.folder / name
+        partial = path.with_name(path.name + ".partial")
+        data = contents.encode() if isinstance(contents, str) else contents
+        try:
+            partial.write_bytes(data)
+            partial.replace(path)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                partial.unlink()
+            raise cannot_write(path, error, _ROOM.format(folder=self.folder)) from error
+        return path
+
+
+def encode(strides: xr.Dataset) -> bytes:
+    """A dataset as a NetCDF-4 file, the same bytes each time.
+
+    Raises:
+        FileProblem: There is no room for temporary files.
+    """
+    packed = {"zlib": True, "complevel": 1, "shuffle": True}
+    encoding = {name: packed for name, v in strides.data_vars.items() if v.ndim > 2}
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "strides.nc"
+            strides.to_netcdf(path, engine="netcdf4", encoding=encoding)
+            return path.read_bytes()
+    except (OSError, RuntimeError) as error:
+        raise cannot_write(
+            tempfile.gettempdir(), error, "make room for temporary files, or set TMPDIR"
+        ) from error
+
 
 def default_folder(name: str = "comparison") -> Path:
     """results/<time>-<name> below the current folder."""
     return Path("results") / f"{datetime.now():%Y%m%d-%H%M%S}-{name}"
-
-
-def cpu_name() -> str:
-    """The processor's name, as far as the system tells."""
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        for line in info.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
 
 
 def _experiment(settings: Mapping[str, Any]) -> Experiment:
@@ -211,13 +290,3 @@ def _experiment(settings: Mapping[str, Any]) -> Experiment:
         key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()
     }
     return Experiment(**{**values, "schedule": Schedule(**values["schedule"])})
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a small file whole or not at all."""
-    partial = path.with_name(path.name + ".partial")
-    try:
-        partial.write_text(text)
-        partial.replace(path)
-    except OSError as error:
-        raise cannot_write(path, error, "choose another folder") from error

@@ -9,9 +9,10 @@ the seed of a sampled world stands in it too.
 
 from __future__ import annotations
 
+import json
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -48,7 +49,8 @@ class Scenario:
         coulomb: Coulomb friction in the joints, added [N m].
         torque_constant: Torque that a motor gives, over the torque it is asked for.
         full_torque_speed: Joint speed up to which a motor gives its greatest torque [rad/s].
-        no_load_speed: Joint speed at which it gives none any more, falling linearly [rad/s].
+        no_load_speed: Joint speed at which it gives none any more, falling linearly [rad/s]; None
+            where speed does not matter.
         delay: Time from a command to its torque [s], a whole number of time steps.
         payload: Mass fixed to the trunk [kg].
         payload_position: Where the payload sits, in the trunk's frame [m].
@@ -74,8 +76,8 @@ class Scenario:
     damping: float = 0.0
     coulomb: float = 0.0
     torque_constant: float = 1.0
-    full_torque_speed: float = math.inf
-    no_load_speed: float = math.inf
+    full_torque_speed: float = 0.0
+    no_load_speed: float | None = None
     delay: float = 0.0
     payload: float = 0.0
     payload_position: Vector = (0.0, 0.0, 0.06)
@@ -113,6 +115,26 @@ class Scenario:
         if self.seed < 0:
             raise self._wrong("seed must not be negative")
 
+    def to_json(self) -> str:
+        """Everything in it as text; `from_json` reads it."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Scenario:
+        """The scenario that `to_json` wrote.
+
+        Raises:
+            InvalidInput: The text is something else.
+        """
+        try:
+            values = json.loads(text)
+            vectors = {name: tuple(values[name]) for name in _VECTORS}
+            return cls(**{**values, **vectors, "sensors": Sensors(**values["sensors"])})
+        except (KeyError, TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"this is not a scenario ({error}); make the strides again"
+            ) from error
+
     def _check_ground(self) -> None:
         if not self.ground_time_constant >= 2 * self.timestep:
             raise self._wrong(
@@ -125,10 +147,9 @@ class Scenario:
             raise self._wrong("steps are at most half as high as they are long")
 
     def _check_motors(self) -> None:
-        if not 0.0 <= self.full_torque_speed <= self.no_load_speed:
-            raise self._wrong("full_torque_speed must be from 0 to no_load_speed")
-        if self.no_load_speed == self.full_torque_speed != math.inf:
-            raise self._wrong("no_load_speed must be greater than full_torque_speed")
+        no_load = math.inf if self.no_load_speed is None else self.no_load_speed
+        if not 0.0 <= self.full_torque_speed < no_load:
+            raise self._wrong("full_torque_speed must be 0 or more, and less than no_load_speed")
         steps = self.delay / self.timestep
         if not abs(steps - round(steps)) < 1e-6:
             raise self._wrong(
@@ -143,7 +164,7 @@ class Scenario:
     def affine(self) -> bool:
         """Whether servos can play a whole phase at once, with `World.play`: nothing comes between
         the tape and the torque but what is affine in the joints' angles and velocities."""
-        return self.delay == 0.0 and self.no_load_speed == math.inf and self.sensors.perfect
+        return self.delay == 0.0 and self.no_load_speed is None and self.sensors.perfect
 
     @property
     def pushes(self) -> bool:
@@ -213,6 +234,8 @@ def _values(name: str, parts: list[str]) -> dict[str, float]:
     """The values of the mismatches in a name, in the order of `KNOWN`."""
     values: dict[str, float] = {}
     for part in parts:
+        if _world(part) is not None:
+            raise InvalidInput(f"scenario '{name}': a world, as {part}, comes first in a name")
         mismatch, equals, number = part.partition("=")
         if mismatch not in KNOWN:
             raise UnknownName("scenario", part, (*WORLDS, *KNOWN, "random-SEED-INDEX"))

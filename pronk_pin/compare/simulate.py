@@ -6,7 +6,7 @@ A stance ends by time, as its reference does; a flight ends with the touchdown t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..control import (
     Balance,
     Controller,
     ControllerSpec,
+    PhaseLog,
     Tape,
     clip_torque,
     phase_grid,
@@ -204,7 +205,7 @@ class Simulation:
         strides.begin(rows, self._seconds(start), learning, left=self._seconds(steps - start))
 
         stance = self._play(rows, controller.touchdown(rows, learning), part=0)
-        tape, record = controller.liftoff(rows, seen.phase(rows, stance, felt=late))
+        tape, record = controller.liftoff(rows, self._measured(rows, stance, felt=late))
         if seen is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, felt=late))
         strides.stance(rows, record, log, stance)
@@ -216,7 +217,8 @@ class Simulation:
         flight = self._play(rows, tape, part=1) - late
         duration, upright = self._seconds(stance + flight), self.upright[rows]
         tilt = np.maximum(tilt, self._tilt(1, rows, flight))
-        record = controller.landing(rows, seen.phase(rows, flight), duration, upright, tilt)
+        known = self._measured(rows, flight)
+        record = controller.landing(rows, known, duration, upright, tilt)
         if seen is not log:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)
@@ -232,6 +234,23 @@ class Simulation:
             heading=heading,
         )
         self._clock[rows] = start + stance + flight
+
+    def _measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+        """What the robots measured in a part of the stride of so many ticks (m,)."""
+        phase = self._seen.phase(rows, length, felt=felt)
+        if not self.controller.spec.imu:
+            return phase
+        # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
+        rate = self._log.base_rate[rows, : int(length.max()) + 1]
+        if rate.shape[1] == int(length.max()):
+            rate = np.concatenate([rate, rate[:, -1:]], axis=1)
+        force = np.zeros((*rate[:, 1:].shape[:2], 3))
+        force[..., [0, 2]] = np.diff(rate, axis=1) / self._dt
+        last = np.arange(len(rows)), length - 1
+        force[last] = force[last[0], np.maximum(length - 2, 0)]  # the log ends there
+        force -= self.world.scenario.gravity_vector
+        _, force = self._sensors.imu(rows, np.zeros_like(force), force)
+        return replace(phase, specific_force=force)
 
     def _rewind(self, rows: IntArray, start: IntArray) -> None:
         """The ticks from `start` (m,) on, in which a touchdown was not felt, are the stance's."""

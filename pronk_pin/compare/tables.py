@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import itertools
-import textwrap
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from .._typing import Array
 from ..robot import JOINTS
 from .metrics import reduction
 from .paper import table_1
+from .practice import RIVAL, beaten
+from .statistics import Interval, compare_controllers, family, mean_interval, robots, unit_of
 
 SHOWN = ("calf", "thigh")
 """Joints of the paper's Table I."""
 
-_WIDTH = 96
-_QUANTITIES = ("PD", "ILC", "reduction")
+_MOVING = 0.05
+"""Speed from which on a robot goes somewhere, so that its transport has a cost [m/s]."""
 
 
 def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
@@ -48,123 +51,93 @@ def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
             if (joint, source, "PD") in table and (joint, source, "ILC") in table:
                 ratio = table[joint, source, "ILC"] / table[joint, source, "PD"]
                 table[joint, source, "reduction"] = 1.0 - ratio
-    order = itertools.product(SHOWN, ("ours", "paper"), _QUANTITIES)
+    order = itertools.product(SHOWN, ("ours", "paper"), ("PD", "ILC", "reduction"))
     return table[[name for name in order if name in table]].rename_axis("speed")
 
 
 def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
-    """One row a controller: means over the speeds and seeds, in the order of the calf's error.
+    """One row a controller, in the order of the calf's error: what it reaches, and how sure it is.
 
-    Columns: `calf`, `thigh` (mean peak [rad]), `calf_reduction`, `thigh_reduction` (of the mean
-    peak against PD's), `calf_rms`, `thigh_rms` [rad], `strides` (to converge, the slowest speed),
-    `feedback` (its share of the torque), `speed_error` [m/s], `apex_error` [m] (mean magnitudes),
-    `upright` (robots that stayed up) and `robots`.
+    Means are over the robots that did not fall, of all speeds and seeds; a column with `_low` and
+    `_high` beside it has an interval. With `j` for `calf` and `thigh`, the columns are
+
+    - `j`: mean peak error [rad], with interval; `j_rms`: mean RMS error [rad];
+    - `j_reduction`: of the mean peak against PD's, with interval;
+    - `j_model`: 1 where it is better than the model's feedforward beyond doubt, -1 where it is
+      worse, 0 where the interval of the difference holds 0;
+    - `j_wins`: share of the robots that have a smaller error than with the model, with interval;
+    - `beat_strides`, `beat`, `learners`: strides of learning until calf and thigh beat the model
+      (median over the robots that do), how many do, of how many;
+    - `strides`: to converge, the slowest robot; NaN if one does not;
+    - `feedback`: its share of the torque; `cost`: mean cost of transport of the robots that move;
+    - `speed_error` [m/s], `apex_error` [m]: mean magnitudes;
+    - `upright`: robots that stayed up; `robots`: how many there were;
+    - `unit`: what the intervals are drawn over, see `compare.statistics`.
+
+    Args:
+        summary: See `compare.metrics`.
+        scenario: A world, or a family of sampled ones.
     """
-    mine = summary[summary["scenario"] == scenario]
-    rows = {}
-    for controller, part in mine.groupby("controller"):
-        strides, upright = _values(part, "strides_to_converge"), _values(part, "upright")
-        rows[controller] = {
-            **{joint: _values(part, "peak_error", joint).mean() for joint in SHOWN},
-            **{f"{joint}_rms": _values(part, "rms_error", joint).mean() for joint in SHOWN},
-            "strides": strides.max(skipna=False),
-            "feedback": _values(part, "feedback_share").mean(),
-            "speed_error": _values(part, "speed_error").abs().mean(),
-            "apex_error": _values(part, "apex_error").abs().mean(),
-            "upright": upright.sum(),
-            "robots": len(upright),
-        }
-    table = pd.DataFrame(rows).T.rename_axis("controller")
-    if "pd" in table.index:
-        for joint in SHOWN:
-            table[f"{joint}_reduction"] = 1.0 - table[joint] / table.loc["pd", joint]
+    mine = summary[summary["scenario"].map(family) == scenario]
+    names = [str(name) for name in mine["controller"].unique()]
+    rows = {name: _row(mine, scenario, name, rivals=set(names) - {name}) for name in names}
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("controller")
     return table.sort_values("calf", ascending=False)
 
 
-def _values(rows: pd.DataFrame, metric: str, joint: str = "-") -> pd.Series[float]:
-    """All values of one metric and joint."""
-    return rows[(rows["metric"] == metric) & (rows["joint"] == joint)]["value"]
+def answer(summary: pd.DataFrame) -> pd.DataFrame:
+    """The overviews of all worlds, indexed by scenario and controller, in the summary's order."""
+    families = list(dict.fromkeys(summary["scenario"].map(family)))
+    return pd.concat(
+        {name: overview(summary, scenario=name) for name in families}, names=["scenario"]
+    )
+
+
+def _row(summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[str]) -> Any:
+    """A controller's row of `overview`."""
+    mine: dict[str, Any] = {"scenario": scenario, "controller": controller}
+
+    def values(metric: str, joint: str = "-") -> Array:
+        found = robots(summary, **mine, metric=metric, joint=joint)
+        return np.asarray(found.to_numpy(dtype=float)).ravel()
+
+    row: dict[str, Any] = {}
+    for joint in SHOWN:
+        row |= _interval(joint, mean_interval(robots(summary, **mine, joint=joint)))
+        row[f"{joint}_rms"] = _mean(values("rms_error", joint))
+        if "pd" in rivals:
+            found = compare_controllers(summary, **mine, against="pd", joint=joint)
+            row |= _interval(f"{joint}_reduction", found.reduction)
+        if RIVAL in rivals:
+            found = compare_controllers(summary, **mine, against=RIVAL, joint=joint)
+            row[f"{joint}_model"] = {True: 1, None: 0, False: -1}[found.better]
+            row |= _interval(f"{joint}_wins", found.improvement)
+    settled = summary[(summary["controller"] == controller) & (summary["joint"] == "-")]
+    settled = settled[settled["metric"] == "strides_to_converge"]["value"]
+    row["strides"] = settled.max(skipna=False)
+    row["beat_strides"], row["beat"], row["learners"] = beaten(summary, controller=controller)
+    row["feedback"] = _mean(values("feedback_share"))
+    cost = robots(summary, **mine, metric="cost_of_transport", joint="-")
+    row["cost"] = _mean(cost.loc[:, np.abs(cost.columns.to_numpy(float)) > _MOVING].to_numpy(float))
+    row["speed_error"] = _mean(np.abs(values("speed_error")))
+    row["apex_error"] = _mean(np.abs(values("apex_error")))
+    upright = values("upright")
+    row["upright"], row["robots"] = int(np.nansum(upright)), int(np.isfinite(upright).sum())
+    row["unit"] = unit_of(robots(summary, **mine, metric="upright", joint="-"))
+    return row
+
+
+def _interval(name: str, found: Interval) -> dict[str, float]:
+    return {name: found.value, f"{name}_low": found.low, f"{name}_high": found.high}
+
+
+def _mean(values: Array) -> float:
+    """Mean of what there is; NaN without anything."""
+    return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
 
 
 def worst_reduction(summary: pd.DataFrame, *, scenario: str, controller: str) -> dict[str, float]:
     """Smallest reduction of the peak error over the speeds, by joint; negative is worse than PD."""
     peaks = reduction(summary, "peak_error")
-    mine = peaks[(peaks["scenario"] == scenario) & (peaks["controller"] == controller)]
+    mine = peaks[(peaks["scenario"].map(family) == scenario) & (peaks["controller"] == controller)]
     return {joint: float(mine[mine["joint"] == joint]["value"].min()) for joint in JOINTS}
-
-
-def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
-    """The answer in words, computed from the numbers; empty without `pd` and `ilc`."""
-    table = overview(summary, scenario=scenario)
-    if not {"pd", "ilc"} <= set(table.index):
-        return ""
-    practice = table.loc["ilc"]
-    worst = worst_reduction(summary, scenario=scenario, controller="ilc")
-    sentences = [
-        f"Practice cuts the mean peak error by {practice['calf_reduction']:.0%} in the calf and "
-        f"{practice['thigh_reduction']:.0%} in the thigh against PD "
-        f"({worst['calf']:.0%} and {worst['thigh']:.0%} at the worst speed)"
-        + (
-            f", within {practice['strides']:.0f} strides at every speed."
-            if np.isfinite(practice["strides"])
-            else "; at some speed it has not settled."
-        )
-    ]
-    if "model" in table.index:
-        model = table.loc["model"]
-        wins = [joint for joint in SHOWN if practice[joint] < model[joint]]
-        beats = "beats" if wins else "does not beat"
-        where = f" in the {wins[0]} only" if len(wins) == 1 else ""
-        numbers = ", ".join(
-            f"{practice[joint]:.4f} against {model[joint]:.4f} rad in the {joint}"
-            for joint in SHOWN
-        )
-        sentences.append(f"It {beats} the model's feedforward{where} ({numbers}).")
-    fallen = int((table["robots"] - table["upright"]).sum())
-    counted = {0: "No robot", 1: "One robot"}.get(fallen, f"{fallen} robots")
-    sentences.append(f"{counted} fell.")
-    return " ".join(sentences)
-
-
-def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
-    """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
-    parts = [
-        _format_beside(beside_the_paper(summary, scenario=scenario)),
-        _format_overview(overview(summary, scenario=scenario)),
-        textwrap.fill(verdict(summary, scenario=scenario), _WIDTH),
-    ]
-    return "\n\n".join(part for part in parts if part)
-
-
-def _format_beside(table: pd.DataFrame) -> str:
-    lines = [
-        " " * 8 + "".join(f"{f'{joint}: peak stance error [rad]':^44}" for joint in SHOWN),
-        f"{'speed':>6}  " + f"{'this run':^22}{'paper, Table I':^22}" * len(SHOWN),
-        f"{'[m/s]':>6}" + f"{'PD':>8}{'ILC':>7}{'less':>7}" * 2 * len(SHOWN),
-    ]
-    for speed, row in table.iterrows():
-        cells = ""
-        for joint, source in itertools.product(SHOWN, ("ours", "paper")):
-            pd_, ilc, less = (row.get((joint, source, name), np.nan) for name in _QUANTITIES)
-            cells += f"{_number(pd_, '.3f'):>8}{_number(ilc, '.3f'):>7}{_number(less, '.0%'):>7}"
-        lines.append(f"{speed if isinstance(speed, str) else f'{speed:.2g}':>6}{cells}")
-    return "\n".join(line.rstrip() for line in lines)
-
-
-def _format_overview(table: pd.DataFrame) -> str:
-    lines = [
-        f"{'':>10}  {'peak [rad]':^15}  {'RMS [rad]':^15}  strides to  feedback's  stayed",
-        f"{'controller':>10}  {'calf':>7} {'thigh':>7}  {'calf':>7} {'thigh':>7}  "
-        f"{'converge':>10}  {'share':>10}  upright",
-    ]
-    for name, row in table.iterrows():
-        lines.append(
-            f"{name:>10}  {row['calf']:7.4f} {row['thigh']:7.4f}  {row['calf_rms']:7.4f} "
-            f"{row['thigh_rms']:7.4f}  {_number(row['strides'], '.0f'):>10}  "
-            f"{row['feedback']:>10.0%}  {row['upright']:.0f} of {row['robots']:.0f}"
-        )
-    return "\n".join(lines)
-
-
-def _number(value: float, form: str) -> str:
-    return format(value, form) if np.isfinite(value) else "-"

@@ -10,16 +10,14 @@ from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
-    ModelBasedILC,
-    NormOptimalILC,
     PaperILC,
     PDTypeILC,
-    PlantInversionILC,
     StrideSelection,
     anti_windup,
 )
 from .lifted import LiftedModel
 from .linearise import Settings, lifted_model
+from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
 from .placement import FootPlacement
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator

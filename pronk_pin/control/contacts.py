@@ -14,9 +14,8 @@ from ..errors import InvalidInput
 class StanceContact(NamedTuple):
     """What the feet felt in a stance."""
 
-    standing: IntArray
-    """Tick at which the first contact that lasts began; the stance's length where there was none,
-    shape (n,)."""
+    gap: IntArray
+    """Ticks of the longest time without contact, shape (n,)."""
     touchdowns: IntArray
     """Contacts one after the other: 2 where the robot bounced once, shape (n,)."""
     share: Array
@@ -33,22 +32,20 @@ class ContactDetector:
 
     In its first strides, or with heavy rotors, a robot commonly bounces off the ground again after
     two milliseconds, for up to 65 ms of a stance of 160, and learns to do without: a second contact
-    is no reason not to learn. A robot that only comes to stand later than that has begun its stance
+    is no reason not to learn. A robot that is in the air for longer than that has begun its stance
     on a touchdown that was none. (One that was felt less than those 65 ms too early looks like a
     bounce, and is learned from.)
 
     Attributes:
         touchdown: Load above which a contact begins, over the weight.
         liftoff: Load below which it ends, over the weight.
-        lasting: Ticks from which on a contact lasts, and is no bounce.
-        latest: Share of the stance within which a contact that lasts has to begin.
+        longest: Share of the stance that a bounce takes at most.
         least: Share of the stance that has to be contact.
     """
 
     touchdown: float = 0.3
     liftoff: float = 0.1
-    lasting: int = 10
-    latest: float = 0.45
+    longest: float = 0.45
     least: float = 0.5
 
     def __post_init__(self) -> None:
@@ -57,10 +54,8 @@ class ContactDetector:
                 f"contact detection needs 0 < liftoff <= touchdown, as shares of the weight; got "
                 f"{self.liftoff:g} and {self.touchdown:g}"
             )
-        if self.lasting < 1:
-            raise InvalidInput("contact detection needs lasting, in ticks, to be 1 or more")
-        if not (0.0 <= self.latest <= 1.0 and 0.0 <= self.least <= 1.0):
-            raise InvalidInput("latest and least are shares of the stance, from 0 to 1")
+        if not (0.0 <= self.longest <= 1.0 and 0.0 <= self.least <= 1.0):
+            raise InvalidInput("longest and least are shares of the stance, from 0 to 1")
 
     def contact(self, load: Array) -> BoolArray:
         """Whether there is contact, at each tick; none before the first.
@@ -83,18 +78,13 @@ class ContactDetector:
         ticks = np.arange(load.shape[1])
         contact = self.contact(load) & (ticks < length[:, None])
         begins = contact & ~np.hstack([np.zeros((len(load), 1), dtype=bool), contact[:, :-1]])
-        broken = np.maximum.accumulate(np.where(contact, -1, ticks), axis=1)  # last tick without
-        lasts = contact & (ticks - broken >= self.lasting)
-        standing = np.argmax(lasts, axis=1) - self.lasting + 1
-        return StanceContact(
-            np.where(lasts.any(axis=1), standing, length),
-            begins.sum(axis=1),
-            contact.sum(axis=1) / length,
-        )
+        last = np.maximum.accumulate(np.where(contact, ticks, -1), axis=1)  # tick of contact
+        gap = np.where(ticks < length[:, None], ticks - last, 0).max(axis=1)
+        return StanceContact(gap, begins.sum(axis=1), contact.sum(axis=1) / length)
 
     def false_touchdown(self, stance: StanceContact, length: IntArray) -> BoolArray:
         """Whether stances began without the ground: their touchdown was none, shape (n,)."""
-        return np.asarray(stance.standing > self.latest * length)
+        return np.asarray(stance.gap > self.longest * length)
 
     def contact_lost(self, stance: StanceContact) -> BoolArray:
         """Whether stances were spent in the air for the most part, shape (n,)."""

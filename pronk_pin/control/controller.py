@@ -26,7 +26,6 @@ from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
-    ModelBasedILC,
     PaperILC,
     PDTypeILC,
     StrideSelection,
@@ -34,12 +33,13 @@ from .learning import (
     given,
 )
 from .linearise import Settings, lifted_model
+from .model_based import ModelBasedILC, NormOptimalILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .symmetry import symmetric
 from .tape import Gains, Tape
 
-SOURCES = ("none", "model", "library")
+SOURCES = ("none", "model", "library", "identified")
 """Where a controller's first feedforward can come from."""
 
 LATEST_TOUCHDOWN = 2.0
@@ -52,7 +52,9 @@ class ControllerSpec:
 
     Attributes:
         name: Short name, as on the command line.
-        source: Where its feedforward comes from at first: "none", "model" or "library".
+        source: Where its feedforward comes from at first: "none", "model", "library", or
+            "identified", the model mended by what practice found.
+        mended_gaits: Play gaits that were optimised again with the mended model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
@@ -61,12 +63,14 @@ class ControllerSpec:
         selection: Strides worth learning from.
         contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
+        imu: Whether an accelerometer on the trunk helps that estimate.
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
             contact sensor is one late, and the contact began between two ticks.
     """
 
     name: str
     source: str = "none"
+    mended_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
@@ -75,6 +79,7 @@ class ControllerSpec:
     selection: StrideSelection = field(default_factory=StrideSelection)
     contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
+    imu: bool = False
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
@@ -109,6 +114,11 @@ CONTROLLERS = {
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
+        ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
+        ControllerSpec("ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True),
+        ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
@@ -198,12 +208,16 @@ class Controller:
         )
         self._laws = list(spec.laws)
         self._base = base
+        for law in self._laws:
+            learning_filter = getattr(law, "filter", None)
+            if isinstance(learning_filter, ZeroPhaseFilter):
+                learning_filter.warn()
+        if base != "locked" and (spec.imu or isinstance(spec.law, ModelBasedILC)):
+            raise InvalidInput(
+                f"controller '{spec.name}' has an IMU or a law with a model that count on a level "
+                "trunk; use another controller, or base 'locked'"
+            )
         if isinstance(spec.law, ModelBasedILC):
-            if base != "locked":
-                raise InvalidInput(
-                    f"controller '{spec.name}' learns by a model of the locked base; use another "
-                    "law, or base 'locked'"
-                )
             settings = Settings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
             )

@@ -1,7 +1,8 @@
 """What the controller believes about its speed: leg odometry and a first-order filter.
 
 In stance the feet do not slip, so the joint encoders tell the trunk's speed; in flight it stays as
-it was at lift-off. Section II.E of the paper.
+it was at lift-off. Section II.E of the paper. With an IMU the filter follows changes of the speed
+at once, and smooths the odometry's noise only.
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ class SpeedEstimator:
     def update(self, rows: IntArray, log: PhaseLog) -> Array:
         """Take in a stance that some robots have just finished; their new estimates [m/s].
 
+        With an accelerometer it is the complementary filter T v' = v_legs - v + T a: that of the
+        legs' speed at low, of the integrated acceleration at high frequencies.
+
         Where a sensor failed the estimate stays as it was.
         """
         n, ticks = len(rows), int(log.length.max())
@@ -55,9 +59,15 @@ class SpeedEstimator:
         velocity = leg_odometry(
             self._robot, q.reshape(n * ticks, -1), v.reshape(n * ticks, -1), contact="rolling"
         )
-        for axis, speeds in enumerate((self.speed, self.sideways)):
+        forward = velocity[:, 0].reshape(n, ticks)
+        if log.specific_force is not None:  # gravity does not show in x: the base is level
+            forward = forward + self._time_constant * log.specific_force[:, :ticks, 0]
+            sound &= np.isfinite(forward) | ~used
+            forward = np.where(used, forward, 0.0)
+        aside = velocity[:, 1].reshape(n, ticks)
+        for measured, speeds in ((forward, self.speed), (aside, self.sideways)):
             filtered = first_order(
-                velocity[:, axis].reshape(n, ticks),
+                measured,
                 speeds[rows],
                 time_constant=self._time_constant,
                 timestep=self._timestep,

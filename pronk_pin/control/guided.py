@@ -69,7 +69,8 @@ def guided_derivatives(
         rotors: What the joints add to the URDF.
     """
     rows = guided_rows(robot)
-    free, motors = len(rows), np.eye(robot.nv, robot.nu, k=-NB)[rows]  # (14, 12)
+    free = len(rows)
+    motors = robot.parameters.torque_constant * np.eye(robot.nv, robot.nu, k=-NB)[rows]  # (14, 12)
     kkt, right = _equations(robot, q, v, tau, contact, rotors)
     solution = np.linalg.solve(kkt, right)
     a = np.zeros(robot.nv)

@@ -33,6 +33,8 @@ class PhaseLog:
         pose: Trunk's position and quaternion as the robots believe them, shape (n, ticks, 7); None
             where the trunk is level.
         twist: Trunk's velocity in its own axes, likewise, shape (n, ticks, 6).
+        specific_force: What the accelerometer says, in the trunk's frame [m/s^2], shape
+            (n, ticks, 3); None without an IMU.
     """
 
     joints: Array
@@ -45,6 +47,7 @@ class PhaseLog:
     load: Array | None = None
     pose: Array | None = None
     twist: Array | None = None
+    specific_force: Array | None = None
 
     def index(self, s: Array, ticks: Array | None = None) -> Array:
         """Fractional ticks at which phases s (m,) were measured, shape (n, m).

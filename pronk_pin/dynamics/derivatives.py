@@ -71,9 +71,10 @@ def flight_derivatives(
     """
     q, v = as_state(robot, q, v)
     as_one("q", q)
-    force = np.concatenate([np.zeros(NB), as_array("tau", tau, robot.nu, ())])
+    torque = robot.joint_torques(as_array("tau", tau, robot.nu, ()), v[NB:])
+    force = np.concatenate([np.zeros(NB), torque])
     da_dq, da_dv, inverse = pin.computeABADerivatives(robot.model, robot.data, q, v, force)
-    return FlightDerivatives(da_dq, da_dv, inverse[:, NB:])
+    return FlightDerivatives(da_dq, *_of_motors(robot, v, da_dv, inverse[:, NB:]))
 
 
 def stance_derivatives(
@@ -106,14 +107,26 @@ def stance_derivatives(
     """
     q, v = as_state(robot, q, v)
     as_one("q", q)
-    state = (q, v, as_array("tau", tau, robot.nu, ()))
+    state = (q, v, robot.joint_torques(as_array("tau", tau, robot.nu, ()), v[NB:]))
     legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
     if legs and radius == 0.0:
         solver = point_stance(robot, legs)
         singular = np.bool_(solver.solve(*state).singular)
         if not singular:
-            return StanceDerivatives(*solver.derivatives(), singular)
+            a_q, a_v, a_force, lam_q, lam_v, lam_force = solver.derivatives()
+            a_v, a_tau = _of_motors(robot, v, a_v, a_force)
+            lam_v, lam_tau = _of_motors(robot, v, lam_v, lam_force)
+            return StanceDerivatives(a_q, a_v, a_tau, lam_q, lam_v, lam_tau, singular)
     return _implicit(robot, state, legs, radius)
+
+
+def _of_motors(robot: Robot, v: Array, by_v: Array, by_force: Array) -> tuple[Array, Array]:
+    """Derivatives by v and by the motors' torques, of what depends on the joints' torques."""
+    if robot.parameters.ideal_motors:
+        return by_v, by_force
+    by_v = by_v.copy()
+    by_v[:, NB:] -= by_force * robot.friction_rate(v[NB:])
+    return by_v, robot.parameters.torque_constant * by_force
 
 
 def _implicit(
@@ -129,7 +142,8 @@ def _implicit(
     a, lam, _ = stance_accelerations(robot, state, legs, radius, NO_GAINS)
     nv = robot.nv
     r_q, r_v, c_q, c_v = partials(robot, (q, v, a), lam.reshape(-1, 3), legs, radius)
-    right = np.hstack([-r_q, -r_v, np.eye(nv, robot.nu, k=-NB)])  # (18, 48)
+    motors = robot.parameters.torque_constant * np.eye(nv, robot.nu, k=-NB)
+    right = np.hstack([-r_q, -r_v, motors])  # (18, 48)
     free = np.linalg.solve(pin.crba(robot.model, robot.data, q), right)
     jacobian = jacobian_at(robot, q, legs, radius)
     wanted = np.hstack([-c_q, -c_v, np.zeros((len(lam), robot.nu))]) - jacobian @ free
@@ -179,6 +193,8 @@ def partials(
         external[frame.parentJoint] += frame.placement.act(pin.Force(local, moment))
         turning += jacobian.T @ np.vstack([_cross(local, spin), _cross(moment, spin)])
     r_q, r_v, _ = pin.computeRNEADerivatives(model, data, *motion, external)
+    if not robot.parameters.ideal_motors:
+        r_v[NB:, NB:] += np.diag(robot.friction_rate(motion[1][NB:]))
     return r_q - turning, r_v, c_q.reshape(-1, robot.nv), c_v.reshape(-1, robot.nv)
 
 

@@ -50,14 +50,14 @@ def flight_dynamics(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.A
     Raises:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
     """
-    if np.ndim(tau) == 1:
+    if np.ndim(tau) == 1 and robot.parameters.ideal_motors:
         force = np.zeros(robot.nv)
         force[NB:] = as_array("tau", tau, robot.nu, ())
         quick = quick_result(pin.aba, robot, 0, q, v, force)
         if quick is not None:
             return quick
     q, v = as_state(robot, q, v)
-    tau = as_array("tau", tau, robot.nu, q.shape[:-1])
+    tau = robot.joint_torques(as_array("tau", tau, robot.nu, q.shape[:-1]), v[..., NB:])
     force = np.concatenate([np.zeros((*tau.shape[:-1], NB)), tau], axis=-1)
     a = np.empty_like(v)
     aba, model, data = pin.aba, robot.model, robot.data
@@ -98,14 +98,14 @@ def stance_dynamics(
     legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
     gains = baumgarte_gains(baumgarte)
     simple = bool(legs) and radius == 0.0 and gains == NO_GAINS
-    if simple and np.ndim(tau) == 1:
+    if simple and np.ndim(tau) == 1 and robot.parameters.ideal_motors:
         torque = as_array("tau", tau, robot.nu, ())
         quick = point_stance(robot, legs).quick(q, v, torque)
         if quick is not None:
             return quick
     q, v = as_state(robot, q, v)
     batch = q.shape[:-1]
-    tau = as_array("tau", tau, robot.nu, batch)
+    tau = robot.joint_torques(as_array("tau", tau, robot.nu, batch), v[..., NB:])
     if not batch:
         return stance_accelerations(robot, (q, v, tau), legs, radius, gains)
     states = (q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), tau.reshape(-1, robot.nu))
@@ -139,7 +139,7 @@ def stance_dae(
     """
     q, v = as_state(robot, q, v)
     as_one("q", q)
-    tau = as_array("tau", tau, robot.nu, ())
+    tau = robot.joint_torques(as_array("tau", tau, robot.nu, ()), v[NB:])
     legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
     mass, bias = mass_matrix(robot, q), nonlinear_effects(robot, q, v)
     jacobian = jacobian_at(robot, q, legs, radius)

@@ -60,8 +60,9 @@ class PhaseSimulation:
         foot_drift: How far a standing foot strays from where it stood [m]; of a rolling foot the
             change of its height.
         contact_speed: Greatest speed of a contact point that should be at rest [m/s].
-        energy_drift: Greatest change of the mechanical energy that is not the motors' work [J].
-            Contacts at rest do no work, so this is the error of the integration.
+        energy_drift: Greatest change of the mechanical energy that is not the motors' work, less
+            what joint friction takes [J]. Contacts at rest do no work, so this is the error of the
+            integration.
         singular: Whether the contacts left the forces undetermined somewhere, see
             `StanceDynamics`.
     """
@@ -102,10 +103,11 @@ class _PhaseProblem:
 
     def accelerations(self, q: Array, v: Array, tau: Array) -> StanceDynamics:
         """Acceleration and contact forces."""
+        tau = self.robot.joint_torques(tau, v[NB:])
         return stance_accelerations(self.robot, (q, v, tau), self.legs, self.radius, self.gains)
 
     def rate(self, t: float, y: Array) -> Array:
-        """Time derivative of y = [q, v, work of the motors]."""
+        """Time derivative of y = [q, v, work of the motors, less what friction takes]."""
         nq, nv = self.robot.nq, self.robot.nv
         q, v, tau = _normalized(y[:nq]), y[nq : nq + nv], self.tau(t)
         out = np.empty_like(y)
@@ -117,7 +119,7 @@ class _PhaseProblem:
         out[3:7] = spread @ v[3:NB]
         out[7:nq] = v[NB:]
         out[nq : nq + nv] = self.accelerations(q, v, tau).a
-        out[-1] = tau @ v[NB:]
+        out[-1] = self.robot.joint_torques(tau, v[NB:]) @ v[NB:]
         return out
 
 

@@ -26,6 +26,7 @@ import numpy as np
 from .._typing import Array, BoolArray, IntArray
 from ..dynamics import Contact
 from ..errors import InvalidInput
+from ..parameters import SLIDING
 from ..robot import JOINTS, Robot
 from .newton_euler import BASE_COORDINATES, FrameMotion, mirrored, newton_euler
 from .problem import Base
@@ -151,6 +152,7 @@ def fold(robot: Robot, contact: Contact = "rolling", base: Base = "locked") -> F
     forces, feet = newton_euler(robot, legs, (q, v, a), lam, gravity, lever, base)
     # Over an instant only M dv and the impulses count: no gravity, no velocity products.
     jump, _ = newton_euler(robot, legs, (q, at_rest, a), lam, np.zeros(3), lever, base)
+    constant = robot.parameters.torque_constant
     nb, none = BASE_COORDINATES[base], ca.SX.zeros(3, len(legs))
     apart, _ = newton_euler(robot, legs, (q, v, a), none, gravity, lever, base, "difference")
     leap, _ = newton_euler(
@@ -162,12 +164,27 @@ def fold(robot: Robot, contact: Contact = "rolling", base: Base = "locked") -> F
         base=base,
         legs=legs,
         lever=lever,
-        dynamics=ca.Function("dynamics", [q, v, a, ca.vec(lam)], [forces]),
+        dynamics=ca.Function(
+            "dynamics", [q, v, a, ca.vec(lam)], [_of_motors(robot, legs, forces, v)]
+        ),
         impact=ca.Function("impact", [q, a, ca.vec(lam)], [jump]),
-        asymmetry=ca.Function("asymmetry", [q, v, a], [apart[nb:]]),
+        asymmetry=ca.Function("asymmetry", [q, v, a], [apart[nb:] / constant]),
         jump_asymmetry=ca.Function("jump_asymmetry", [q, a], [leap[nb:]]),
         feet=ca.Function("feet", [q, v, a], _contact_motion(feet, lever)),
     )
+
+
+def _of_motors(robot: Robot, legs: tuple[str, ...], forces: ca.SX, v: ca.SX) -> ca.SX:
+    """Forces along the coordinates with the joints' torques as asked of the motors, which work
+    against friction; `Robot.motor_torques` in CasADi."""
+    n = len(legs) * len(JOINTS)
+    damping, coulomb = (
+        np.tile(getattr(robot.parameters, name), len(legs)) for name in ("damping", "coulomb")
+    )
+    rates = v[-n:]
+    friction = ca.DM(damping) * rates + ca.DM(coulomb) * ca.tanh(rates / SLIDING)
+    torques = (forces[-n:] + friction) / robot.parameters.torque_constant
+    return ca.vertcat(forces[:-n], torques)
 
 
 def _contact_motion(feet: list[FrameMotion], lever: Array) -> list[ca.SX]:

@@ -70,7 +70,7 @@ def guided_equations(
     """
     rows = guided_rows(robot, base)
     mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14 or 15, ...)
-    force = np.concatenate([np.zeros(NB), tau])
+    force = np.concatenate([np.zeros(NB), robot.joint_torques(tau, v[NB:])])
     force = (force - pin.nonLinearEffects(robot.model, robot.data, q, v))[rows]
     if not feet:
         return mass, force

@@ -33,7 +33,7 @@ def missing_forces(robot: Robot, motion: Motion, contact: Contact) -> Array:
     for q, v, a, tau, lam in zip(motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True):
         force = pin.rnea(robot.model, robot.data, q, v, a).copy()
         force -= contact_jacobian(robot, q, contact=contact).T @ lam.ravel()
-        force[NB:] -= tau
+        force[NB:] -= robot.joint_torques(tau, v[NB:])
         missing.append(force)
     return np.array(missing)
 

@@ -37,7 +37,7 @@ class ForceProblem(NamedTuple):
     lever: Array
     """Torques that hold the contact forces [m], shape (..., 12, 3 feet)."""
     b_joints: Array
-    """Torques needed without contact [N m], shape (..., 12)."""
+    """Torques needed without contact, against friction too [N m], shape (..., 12)."""
     wrench: Array
     """Wrench of unit forces on the trunk, in its axes, shape (..., 6, 3 feet + guides)."""
     b_base: Array
@@ -54,7 +54,7 @@ class ForceProblem(NamedTuple):
         return int(self.wrench.shape[-1])
 
     def torques(self, y: Array) -> Array:
-        """Motor torques that go with forces y [N m], shape (..., 12)."""
+        """Torques that motors of torque constant 1 give with forces y [N m], shape (..., 12)."""
         return self.b_joints - apply(self.lever, y[..., : self.contacts])
 
     def rest(self, y: Array) -> Array:
@@ -114,6 +114,8 @@ def force_problem(
         for q_row, v_row, a_row, out, rows in zip(q, v, a, needed, jacobian, strict=True):
             out[:] = rnea(model, data, q_row, v_row, a_row)
             rows[:] = jacobian_at(robot, q_row, legs, radius)
+    if not robot.parameters.ideal_motors:
+        needed[..., NB:] += robot.friction(v[..., NB:])
     transposed = np.swapaxes(jacobian, -1, -2)  # (..., 18, 3 feet)
     wrench = transposed[..., :NB, :]
     if axes:

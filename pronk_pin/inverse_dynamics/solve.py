@@ -129,9 +129,9 @@ def inverse_dynamics(
     forces = conditions.solve()
     inside: BoolArray | np.bool_ = np.True_
     if friction is not None:
-        tau_max = _torque_limits(robot, torque_limits)
+        tau_max = robot.parameters.torque_constant * _torque_limits(robot, torque_limits)
         inside = _constrain(problem, conditions, forces, _positive("friction", friction), tau_max)
-    return _solution(problem, forces, inside, batch)
+    return _solution(problem, forces, inside, batch, robot.parameters.torque_constant)
 
 
 def feedforward(
@@ -237,13 +237,17 @@ def _constrain(
 
 
 def _solution(
-    problem: ForceProblem, forces: Array, inside: BoolArray | np.bool_, batch: tuple[int, ...]
+    problem: ForceProblem,
+    forces: Array,
+    inside: BoolArray | np.bool_,
+    batch: tuple[int, ...],
+    torque_constant: float,
 ) -> InverseDynamics:
     """Torques, forces and verdicts, in the shape of the batch."""
     contacts = problem.contacts
     residual = np.abs(problem.rest(forces)).max(axis=-1)
     return InverseDynamics(
-        tau=problem.torques(forces).reshape(*batch, problem.b_joints.shape[-1]),
+        tau=problem.torques(forces).reshape(*batch, problem.b_joints.shape[-1]) / torque_constant,
         lam=forces[..., :contacts].reshape(*batch, contacts),
         guide=forces[..., contacts:].reshape(*batch, problem.size - contacts),
         residual=residual.reshape(batch),

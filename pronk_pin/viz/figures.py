@@ -1,11 +1,8 @@
-"""Figures of the paper and of the report: results in, matplotlib figures out.
-
-Colours are those of Okabe and Ito, which readers with any colour vision tell apart.
-"""
+"""Figures of the paper and of the report: results in, matplotlib figures out; see `style`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -14,34 +11,36 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .._typing import Array
+from .._typing import Array, IntArray
 from ..compare.metrics import by_joint, steady
 from ..compare.paper import table_1
+from .style import (
+    ACCENT,
+    DIVERGING,
+    LOOKS,
+    REFERENCE,
+    SEQUENTIAL,
+    TWO_COLUMNS,
+    in_order,
+    legend_below,
+    look,
+    new_figure,
+    styled,
+)
 
-COLORS = {
-    "pd": "#000000",
-    "model": "#E69F00",
-    "library": "#56B4E9",
-    "ilc": "#0072B2",
-    "model+ilc": "#009E73",
-    "ilc-paper": "#D55E00",
-    "paper": "#CC79A7",
-}
-"""Colour of a controller; "paper" are the paper's own numbers."""
-
-LABELS = {
-    "pd": "PD",
-    "model": "PD + model",
-    "library": "PD + library",
-    "ilc": "ILC",
-    "model+ilc": "ILC seeded by the model",
-    "ilc-paper": "ILC, the paper's law",
-}
+LABELS = {name: entry.label for name, entry in LOOKS.items()}
+"""Controllers in words."""
 
 _JOINTS = ("calf", "thigh")
 _LEG = "FL"  # the leg that the paper shows
 
 
+def stance(strides: xr.Dataset, name: str) -> xr.DataArray:
+    """A curve of the stance: (speed, stride, phase, joint), or without what it does not have."""
+    return strides[name].sel(part="stance")
+
+
+@styled
 def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float]) -> Figure:
     """Fig. 3 of the paper: the stance before and after the learning is switched on.
 
@@ -55,104 +54,172 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
     learning = np.flatnonzero(mine["learning"].to_numpy()[:count] == 1)
     switch = int(learning[0]) if learning.size else count
     start = mine["start"].to_numpy()
-    figure = _figure(9.0, 5.2)
+    began = start[min(switch, count - 1)]
+    shown = np.flatnonzero((start >= began - seconds[0]) & (start <= began + seconds[1]))
+    figure = new_figure(TWO_COLUMNS, 3.6)
     grid = figure.add_gridspec(2, 4, width_ratios=[2.1, 2.1, 1.2, 1.2])
-    columns: dict[str, Axes] = {}
+    time: Axes | None = None
     for row, joint in enumerate(_JOINTS):
-        measured, planned = _joint_curves(mine, f"{_LEG}_{joint}")
-        axes = figure.add_subplot(grid[row, :2], sharex=columns.get("time"))
-        columns["time"] = axes
-        axes.set_title("measured, and the reference dashed", fontsize=8, loc="right")
-        inside = (start >= start[switch] - seconds[0]) & (start <= start[switch] + seconds[1])
-        for k in np.flatnonzero(inside):
-            t = start[k] + mine["phase"].to_numpy() * float(mine["stance"][k])
-            axes.plot(t, planned, "--", color="0.45", lw=1.0)
-            axes.plot(t, measured[k], color=COLORS["ilc"] if k >= switch else COLORS["pd"], lw=1.2)
-        axes.axvline(start[switch], color=COLORS["ilc-paper"], lw=1.0)
-        axes.set_ylabel(f"{joint}, {_LEG} [rad]")
-        axes.annotate("learning on", (start[switch], 1.01), xycoords=("data", "axes fraction"))
-        for column, (name, stride) in enumerate((("PD", switch - 1), ("ILC", count - 1))):
-            one = figure.add_subplot(grid[row, 2 + column], sharey=columns.get(joint))
-            columns[joint] = one
-            one.plot(mine["phase"], planned, "--", color="0.45", lw=1.2)
-            color = COLORS["pd" if name == "PD" else "ilc"]
-            one.plot(mine["phase"], measured[stride], color=color, lw=1.4)
-            peak = float(np.max(np.abs(measured[stride] - planned)))
-            one.set_title(f"{name}: peak {peak:.3f} rad", fontsize=8)
+        time = figure.add_subplot(grid[row, :2], sharex=time)
+        _over_time(time, mine, f"{_LEG}_{joint}", shown, switch)
+        if learning.size:
+            time.axvline(began, color=ACCENT, lw=1.0)
+            time.annotate("learning on", (began, 1.02), xycoords=("data", "axes fraction"))
+        time.set_ylabel(f"{joint}, {_LEG} [rad]")
+        first: Axes | None = None
+        for column, (name, stride) in enumerate((("pd", switch - 1), ("ilc", count - 1))):
+            first = figure.add_subplot(grid[row, 2 + column], sharey=first)
+            _one_stance(first, mine, f"{_LEG}_{joint}", stride, name)
             if row == 1:
-                one.set_xlabel("stance phase")
-    columns["time"].set_xlabel("time [s]; stance only")
+                first.set_xlabel("stance phase")
+    if time is not None:
+        time.set_xlabel("time [s]; stance only; dashed: reference")
     figure.suptitle(f"Tracking before and after the learning is switched on, {speed:g} m/s")
     return figure
 
 
+def _over_time(axes: Axes, mine: xr.Dataset, joint: str, shown: IntArray, switch: int) -> None:
+    """Measured and planned angle of a joint in the stances of some strides."""
+    measured, planned = _joint_curves(mine, joint)
+    for k in shown:
+        t = mine["start"].to_numpy()[k] + mine["phase"].to_numpy() * float(mine["stance"][k])
+        axes.plot(t, planned, "--", color=REFERENCE, lw=0.8)
+        axes.plot(t, measured[k], color=look("ilc" if k >= switch else "pd").color)
+
+
+def _one_stance(axes: Axes, mine: xr.Dataset, joint: str, stride: int, name: str) -> None:
+    """Measured and planned angle of a joint in the stance of one stride."""
+    measured, planned = _joint_curves(mine, joint)
+    axes.plot(mine["phase"], planned, "--", color=REFERENCE)
+    axes.plot(mine["phase"], measured[stride], color=look(name).color)
+    peak = float(np.max(np.abs(measured[stride] - planned)))
+    axes.set_title(f"{LABELS[name]}: {peak:.3f} rad")
+
+
+@styled
 def torque_library(strides: xr.Dataset) -> Figure:
     """Fig. 4 of the paper: the learned torque over the stance phase, by speed."""
-    torque = steady(strides)["feedforward"].sel(part="stance").mean("stride")
-    speeds = strides["speed"].to_numpy()
-    figure = _figure(8.0, 3.4)
-    axes = figure.subplots(1, 2)
-    colors = colormaps["viridis"](np.linspace(0.0, 0.95, len(speeds)))
-    for one, joint in zip(axes, _JOINTS, strict=True):
-        for k in range(len(speeds)):
-            curve = torque.isel(speed=k).sel(joint=f"{_LEG}_{joint}")
-            one.plot(strides["phase"], curve, color=colors[k], lw=1.2, label=f"{speeds[k]:g}")
-        one.set_title(f"{joint}, {_LEG}", fontsize=9)
-        one.set_xlabel("stance phase")
-        one.set_ylabel("learned torque [N m]")
-    axes[1].legend(title="speed [m/s]", fontsize=6, title_fontsize=7, ncols=2)
+    return _by_speed(_learned(strides), strides["phase"].to_numpy(), "learned torque [N m]")
+
+
+@styled
+def torque_surface(strides: xr.Dataset) -> Figure:
+    """The learned torque as a surface over speed and stance phase, by its contours."""
+    torque = _learned(strides)
+    figure = new_figure(TWO_COLUMNS, 2.6)
+    for axes, joint in zip(figure.subplots(1, 2), _JOINTS, strict=True):
+        surface = torque.sel(joint=f"{_LEG}_{joint}").transpose("speed", "phase")
+        x, y, z = (a.to_numpy() for a in (strides["phase"], strides["speed"], surface))
+        if len(y) < 2:  # one speed is no surface: a stripe
+            y, z = y[0] + np.array([-0.05, 0.05]), np.repeat(z, 2, axis=0)
+        signed = bool(z.min() < 0.0 < z.max())
+        largest = float(np.abs(z).max())
+        limits = {"vmin": -largest, "vmax": largest} if signed else {}
+        cmap = DIVERGING if signed else SEQUENTIAL
+        filled = axes.pcolormesh(x, y, z, cmap=cmap, shading="gouraud", rasterized=True, **limits)
+        if np.ptp(z) > 0.0:
+            color = "0.15" if signed else "white"
+            lines = axes.contour(x, y, z, levels=8, colors=color, linewidths=0.5)
+            axes.clabel(lines, fontsize=6)
+        axes.grid(visible=False)
+        axes.set_title(f"{joint}, {_LEG}")
+        axes.set_xlabel("stance phase")
+        axes.set_ylabel("speed [m/s]")
+        figure.colorbar(filled, ax=axes, label="learned torque [N m]")
     return figure
 
 
+@styled
+def learned_minus_model(learned: xr.Dataset, model: xr.Dataset) -> Figure:
+    """What practice adds to the model: learned minus the model's feedforward torque, by speed.
+
+    Args:
+        learned: The strides of a learning controller.
+        model: Those of the model's feedforward, at the same speeds.
+    """
+    difference = _learned(learned) - _learned(model)
+    return _by_speed(difference, learned["phase"].to_numpy(), "learned minus model torque [N m]")
+
+
+def _learned(strides: xr.Dataset) -> xr.DataArray:
+    """The steady strides' mean feedforward in stance [N m]: (speed, phase, joint)."""
+    return stance(steady(strides), "feedforward").mean("stride")
+
+
+def _by_speed(torque: xr.DataArray, phase: Array, label: str) -> Figure:
+    """Curves over the stance phase, coloured by speed."""
+    speeds = torque["speed"].to_numpy()
+    figure = new_figure(TWO_COLUMNS, 2.6)
+    panels = figure.subplots(1, 2)
+    colors = colormaps[SEQUENTIAL](np.linspace(0.0, 0.92, len(speeds)))
+    for axes, joint in zip(panels, _JOINTS, strict=True):
+        for k in range(len(speeds)):
+            curve = torque.isel(speed=k).sel(joint=f"{_LEG}_{joint}")
+            axes.plot(phase, curve, color=colors[k], label=f"{speeds[k]:g}")
+        axes.axhline(0.0, color="0.6", lw=0.6)
+        axes.set_title(f"{joint}, {_LEG}")
+        axes.set_xlabel("stance phase")
+        axes.set_ylabel(label)
+    handles, labels = panels[0].get_legend_handles_labels()
+    columns = 1 if len(labels) <= 8 else 2
+    title = "speed [m/s]"
+    figure.legend(handles, labels, title=title, loc="outside right center", ncols=columns)
+    return figure
+
+
+@styled
 def errors_by_speed(summary: pd.DataFrame, *, scenario: str) -> Figure:
     """Peak stance error over the speed, for every controller, with the paper's Table I."""
     rows = summary[(summary["metric"] == "peak_error") & (summary["scenario"] == scenario)]
-    figure = _figure(8.0, 3.7)
-    axes = figure.subplots(1, 2)
-    for one, joint in zip(axes, _JOINTS, strict=True):
+    figure = new_figure(TWO_COLUMNS, 2.9)
+    panels = figure.subplots(1, 2)
+    for axes, joint in zip(panels, _JOINTS, strict=True):
         printed = table_1()
         for controller, marker in (("pd", "x"), ("ilc", "+")):
             paper = printed[(printed["joint"] == joint) & (printed["controller"] == controller)]
             label = f"paper, {LABELS[controller]}"
-            one.plot(paper["speed"], paper["value"], marker, color=COLORS["paper"], label=label)
-        for controller in _known(rows["controller"].unique()):
+            axes.plot(
+                paper["speed"], paper["value"], marker, color=look("paper").color, label=label
+            )
+        for controller in in_order(rows["controller"].unique()):
             mine = rows[(rows["joint"] == joint) & (rows["controller"] == controller)]
             mean = mine.groupby("speed")["value"].mean()
-            style = {"color": COLORS[controller], "label": LABELS[controller], "lw": 1.3}
-            dashes = (4, 2) if controller == "library" else (None, None)
-            one.plot(mean.index, mean, marker=".", dashes=dashes, **style)
-        one.set_title(joint, fontsize=9)
-        one.set_xlabel("speed [m/s]")
-        one.set_ylabel("peak stance error [rad]")
-        one.set_ylim(bottom=0.0)
-    _legend_below(figure, axes[0])
+            style = look(controller)
+            axes.plot(mean.index, mean, marker=style.marker, **style.curve)
+        axes.set_title(joint)
+        axes.set_xlabel("speed [m/s]")
+        axes.set_ylabel("peak stance error [rad]")
+        axes.set_ylim(bottom=0.0)
+    legend_below(figure, *panels[0].get_legend_handles_labels())
     return figure
 
 
+@styled
 def learning_curves(strides: Mapping[str, xr.Dataset]) -> Figure:
     """Peak error over the strides of learning, with the levels of those that do not learn.
 
     Args:
         strides: The strides by controller.
     """
-    figure = _figure(8.0, 3.4)
-    axes = figure.subplots(1, 2)
-    for one, joint in zip(axes, _JOINTS, strict=True):
-        for controller in _known(strides):
-            curves = _learning(strides[controller], joint)
-            color, label = COLORS[controller], LABELS[controller]
+    figure = new_figure(TWO_COLUMNS, 2.7)
+    panels = figure.subplots(1, 2)
+    for axes, joint in zip(panels, _JOINTS, strict=True):
+        for controller in in_order(strides):
+            curves, style = _learning(strides[controller], joint), look(controller)
             if curves is None:
                 peak = by_joint(steady(strides[controller])["peak_error"]).sel(joint=joint)
-                one.axhline(float(peak.mean()), color=color, ls=":", lw=1.3, label=label)
+                level = float(peak.mean())
+                axes.axhline(level, color=style.color, ls=":", label=style.label)
+                axes.plot([-2], [level], style.marker, color=style.color)
                 continue
             k = np.arange(-2, curves.shape[1] - 2)
-            one.plot(k, np.mean(curves, axis=0), color=color, lw=1.4, label=label)
-            one.fill_between(k, curves.min(0), curves.max(0), color=color, alpha=0.2, lw=0)
-        one.set_title(f"{joint}: mean and range over the speeds", fontsize=9)
-        one.set_xlabel("strides since the learning was switched on")
-        one.set_ylabel("peak stance error [rad]")
-        one.set_ylim(bottom=0.0)
-    _legend_below(figure, axes[0])
+            axes.plot(k, np.mean(curves, axis=0), **style.curve)
+            axes.fill_between(k, curves.min(0), curves.max(0), color=style.color, alpha=0.2, lw=0)
+        axes.set_title(f"{joint}: mean and range over the speeds")
+        axes.set_xlabel("strides since the learning was switched on")
+        axes.set_ylabel("peak stance error [rad]")
+        axes.set_ylim(bottom=0.0)
+    legend_below(figure, *panels[0].get_legend_handles_labels())
     return figure
 
 
@@ -169,21 +236,5 @@ def _learning(strides: xr.Dataset, joint: str, length: int = 27) -> Array | None
 
 def _joint_curves(strides: xr.Dataset, joint: str) -> tuple[Array, Array]:
     """Measured (strides, samples) and reference (samples,) angle of a joint in stance [rad]."""
-    stance = strides[["reference", "error"]].sel(part="stance", joint=joint)
-    planned = stance["reference"].to_numpy()
-    return planned - stance["error"].to_numpy(), planned
-
-
-def _known(controllers: Iterable[str]) -> list[str]:
-    """Controllers in the order of the legend."""
-    names = set(controllers)
-    return [name for name in LABELS if name in names]
-
-
-def _legend_below(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=7)
-
-
-def _figure(width: float, height: float) -> Figure:
-    return Figure(figsize=(width, height), layout="constrained")
+    planned = stance(strides, "reference").sel(joint=joint).to_numpy()
+    return planned - stance(strides, "error").sel(joint=joint).to_numpy(), planned

@@ -14,13 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from .._typing import Array
-from ..errors import InvalidInput, cannot_write
 from ..gait import Gait, GaitLibrary, Motion
 from ..kinematics import foot_positions
 from ..robot import JOINTS, NB, Robot, load_robot
-
-FORMATS = ("png", "svg", "pdf")
-"""Formats that figures are written in."""
+from .style import ACCENT, SEQUENTIAL, known_format, new_figure, save_figure, styled
 
 _SAMPLES = 81
 _FRAMES = 7
@@ -53,8 +50,7 @@ def write_gait_figures(
         SpeedOutOfRange: The library does not cover the speed.
         FileProblem: A figure cannot be written.
     """
-    if suffix not in FORMATS:
-        raise InvalidInput(f"figures cannot be written as '{suffix}'; choose {', '.join(FORMATS)}")
+    known_format(suffix)
     robot = load_robot(library.robot) if robot is None else robot
     part = library.at_apex(apex)
     if speed is None:
@@ -63,18 +59,13 @@ def write_gait_figures(
         "stride": stride_figure(part, robot),
         "side": side_view(part.at(speed), robot, base=library.base),
     }
-    paths = []
-    for name, figure in figures.items():
-        path = folder / f"{library.robot}-{library.metadata.get('gait', 'gait')}-{name}.{suffix}"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path, dpi=150, bbox_inches="tight")
-        except OSError as error:
-            raise cannot_write(path, error, "choose another --folder") from error
-        paths.append(path)
-    return paths
+    stem = f"{library.robot}-{library.metadata.get('gait', 'gait')}"
+    return [
+        save_figure(figure, folder / f"{stem}-{name}.{suffix}") for name, figure in figures.items()
+    ]
 
 
+@styled
 def stride_figure(library: GaitLibrary, robot: Robot) -> Figure:
     """Joint angles, torques, ground forces and the trunk over the stride, for all speeds.
 
@@ -82,11 +73,11 @@ def stride_figure(library: GaitLibrary, robot: Robot) -> Figure:
         library: Gaits at one apex.
         robot: Their robot.
     """
-    figure = Figure(figsize=(11.0, 11.5), layout="constrained")
+    figure = new_figure(11.0, 11.5)
     grid = GridSpec(5, 4, figure=figure, height_ratios=[1, 1, 1, 1, 1])
     speeds = library.speeds
     norm = Normalize(float(speeds[0]), float(max(speeds[-1], speeds[0] + 1e-3)))
-    colors = colormaps["viridis"]
+    colors = colormaps[SEQUENTIAL]
     axes = _axes(figure, grid, pitch=library.base == "sagittal")
     left = [i for i, leg in enumerate(robot.legs) if leg.endswith("L")]
     for gait in library.gaits:
@@ -111,6 +102,7 @@ def stride_figure(library: GaitLibrary, robot: Robot) -> Figure:
     return figure
 
 
+@styled
 def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
     """A stroboscopic side view of one stride, with the forces of the ground.
 
@@ -121,11 +113,11 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
         robot: Its robot.
         base: How the trunk moves, for the title.
     """
-    figure = Figure(figsize=(11.0, 2.5), layout="constrained")
+    figure = new_figure(11.0, 2.5)
     axes = figure.subplots()
     times = np.linspace(0.0, gait.duration, _FRAMES, endpoint=False)
     spread = 0.62  # m between two poses, on top of how far the robot went
-    colors = colormaps["viridis"](np.linspace(0.0, 0.85, _FRAMES))
+    colors = colormaps[SEQUENTIAL](np.linspace(0.0, 0.85, _FRAMES))
     for frame, time in enumerate(times):
         motion, name = _at(gait, robot, float(time))
         shift = frame * spread
@@ -233,7 +225,7 @@ def _limits(axes: Axes, key: str, robot: Robot) -> None:
     low, high = axes.get_ylim()
     for bound in bounds:
         if low - 0.3 * (high - low) < bound < high + 0.3 * (high - low):
-            axes.axhline(bound, color="#D55E00", lw=0.8, ls="--")
+            axes.axhline(bound, color=ACCENT, lw=0.8, ls="--")
 
 
 def _starts(gait: Gait) -> Array:
@@ -273,7 +265,7 @@ def _pose(axes: Axes, robot: Robot, motion: Motion, shift: float, color: Array) 
                 "",
                 xy=(feet[leg, 0] + shift + force[0], force[2]),
                 xytext=(feet[leg, 0] + shift, 0.0),
-                arrowprops={"arrowstyle": "->", "color": "#D55E00", "lw": 1.4},
+                arrowprops={"arrowstyle": "->", "color": ACCENT, "lw": 1.4},
             )
     trunk = np.array(hips)
     axes.plot(trunk[:, 0] + shift, trunk[:, 2], color=color, lw=6.0, solid_capstyle="round")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from pronk_pin._typing import Array
 from pronk_pin.compare import Experiment, Results, Schedule, Simulation, load_scenario
+from pronk_pin.compare.metrics import COLUMNS
 from pronk_pin.compare.run import run_experiment
 from pronk_pin.control import ControllerSpec
 from pronk_pin.gait import Gait, load_library
@@ -55,3 +57,28 @@ def simulation(robot: Robot, gaits: list[Gait]) -> Callable[..., Simulation]:
         )
 
     return build
+
+
+PEAKS = {"pd": (0.10, 0.05), "ilc": (0.02, 0.01), "model": (0.03, 0.005)}
+"""Peak errors of calf and thigh in the made summary."""
+
+
+@pytest.fixture
+def summary() -> pd.DataFrame:
+    """Two speeds, of which the paper has one; errors twice as large at the other."""
+    rows: list[dict[str, object]] = []
+    for controller, peaks in PEAKS.items():
+        for speed, scale in ((0.3, 1.0), (0.35, 2.0)):
+            key = {"robot": "a1", "base": "locked", "scenario": "nominal", "speed": speed}
+            key |= {"controller": controller, "seed": 0}
+            for joint, peak in zip(("calf", "thigh"), peaks, strict=True):
+                for metric, share in (("peak_error", 1.0), ("rms_error", 0.1)):
+                    value = scale * share * peak
+                    rows.append({**key, "joint": joint, "metric": metric, "value": value})
+            scalars = {"upright": 1.0, "feedback_share": 0.2, "speed_error": 0.1 * (scale - 1.5)}
+            scalars["apex_error"] = 0.0
+            if controller == "ilc":
+                scalars["strides_to_converge"] = 4.0 * scale
+                scalars["strides_to_beat_model"] = 3.0 if scale < 2.0 else np.nan
+            rows += [{**key, "joint": "-", "metric": m, "value": v} for m, v in scalars.items()]
+    return pd.DataFrame(rows).assign(unit="1")[COLUMNS]

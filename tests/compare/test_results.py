@@ -2,6 +2,9 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +15,8 @@ import pytest
 import xarray as xr
 
 from pronk_pin.compare import Experiment, Results, default_folder, summarize
+from pronk_pin.compare.provenance import git_state
+from pronk_pin.compare.results import encode
 from pronk_pin.errors import FileProblem, InvalidInput
 
 
@@ -39,13 +44,60 @@ def test_a_folder_gives_back_the_experiment_it_was_made_for(tmp_path: Path) -> N
     assert Results.load(tmp_path / "new" / "run").experiment == experiment
 
 
-def test_the_config_says_what_ran_where(comparison: Results) -> None:
-    config = comparison.config
-    assert config["finished"] is True
-    assert config["wall_time_s"] > 0.0
-    assert {"pin", "mujoco", "numpy", "pronk-pin"} <= set(config["versions"])
-    assert config["cpu"]
+def test_the_provenance_says_what_ran_where_and_how_long(comparison: Results) -> None:
+    known = comparison.provenance
+    assert known["finished"] is True
+    (run,) = known["runs"]
+    assert run["wall_time_s"] > 0.0
+    assert {"pin", "mujoco", "numpy", "pronk-pin"} <= set(run["versions"])
+    assert run["cpu"]
+    assert set(run["cells"]) == {cell.name for cell in comparison.experiment.cells()}
+
+
+def test_the_config_is_the_experiment_and_nothing_that_changes(comparison: Results) -> None:
+    config = json.loads((comparison.folder / "config.json").read_text())
+    assert set(config) == {"schema", "experiment"}
     assert config["experiment"]["schedule"]["learning"] == 6.0
+
+
+def test_git_is_on_record_only_for_a_source_that_it_tracks(tmp_path: Path) -> None:
+    def git(*arguments: str) -> None:
+        who = ["-c", "user.name=x", "-c", "user.email=x@y"]
+        subprocess.run(["git", "-C", str(tmp_path), *who, *arguments], check=True)
+
+    source = tmp_path / "module.py"
+    source.write_text("")
+    assert git_state(source) is None
+    git("init", "-q")
+    assert git_state(source) is None
+    git("add", "module.py")
+    git("commit", "-qm", "first")
+    commit = git_state(source)
+    assert commit is not None
+    assert len(commit) == 40
+    source.write_text("changed")
+    assert git_state(source) == f"{commit}, changed"
+
+
+def test_a_result_that_other_versions_began_is_not_completed(copy: Results) -> None:
+    copy.check_versions()
+    known = copy.provenance
+    known["runs"][-1]["versions"]["mujoco"] = "3.9.0"
+    copy.write_provenance(known)
+    text = message(copy.check_versions, copy.folder)
+    assert text.startswith("was begun with mujoco 3.9.0, and this is ")
+    assert text.endswith("; install that version again, or choose another folder")
+
+
+@pytest.mark.parametrize("damage", ["", "[1]", '{"finished": true}', '{"runs": []}'])
+def test_a_damaged_provenance_is_refused(copy: Results, damage: str) -> None:
+    path = copy.folder / "provenance.json"
+    path.write_text(damage)
+    text = message(lambda: copy.provenance, path)
+    assert text.startswith("damaged (")
+    assert text.endswith("; delete it: only the record of who made it is lost")
+    path.unlink()
+    assert copy.provenance == {"finished": False, "runs": []}
 
 
 def test_the_summary_that_is_read_is_the_one_that_was_computed(comparison: Results) -> None:
@@ -80,7 +132,7 @@ def test_the_same_experiment_is_taken_up_again(copy: Results) -> None:
     taken = Results.create(copy.experiment, copy.folder)
     assert not taken.has(taken.find(controller="pd"))
     assert (copy.folder / "strides").is_dir()
-    assert taken.config["finished"] is True
+    assert taken.provenance["finished"] is True
 
 
 def test_another_experiment_is_not_mixed_in(copy: Results) -> None:
@@ -119,7 +171,7 @@ def test_a_damaged_config_is_refused(copy: Results, damage: Callable[[Any], str]
 
 def test_a_folder_of_another_version_is_refused(copy: Results) -> None:
     path = copy.folder / "config.json"
-    path.write_text(json.dumps({**copy.config, "schema": 99}))
+    path.write_text(json.dumps({**json.loads(path.read_text()), "schema": 99}))
     text = message(lambda: Results.load(copy.folder), path)
     assert text == "schema 99, not 2; run 'pronk-pin compare' to make one"
 
@@ -159,6 +211,59 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     folder = tmp_path / "file" / "results"
     text = message(lambda: Results.create(Experiment(), folder), folder)
     assert text == "cannot be written (Not a directory); choose a folder of yours with --folder"
+
+
+def test_a_dataset_makes_the_same_bytes_at_any_time(comparison: Results) -> None:
+    strides = comparison.strides(comparison.find(controller="pd"))
+    first = encode(strides)
+    time.sleep(1.1)  # the clock of HDF5's time stamps has seconds
+    assert encode(strides) == first
+
+
+def test_only_the_variables_asked_for_are_read(comparison: Results) -> None:
+    cell = comparison.find(controller="pd")
+    few = comparison.strides(cell, ["count", "peak_error", "of another version"])
+    assert set(few.data_vars) == {"count", "peak_error"}
+    assert few.identical(comparison.strides(cell)[["count", "peak_error"]])
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's full device")
+@pytest.mark.parametrize("name", ["strides/pd_nominal_0.nc", "summary.csv", "config.json"])
+def test_a_full_disk_loses_nothing_that_was_there(copy: Results, name: str) -> None:
+    path = copy.folder / name
+    before = path.read_bytes()
+    path.with_name(path.name + ".partial").symlink_to("/dev/full")
+    text = message(lambda: copy.write(name, b"new"), path)
+    assert text == (
+        "cannot be written (No space left on device); make room, and run the same command again "
+        f"with --folder {copy.folder}"
+    )
+    assert path.read_bytes() == before
+    assert not list(copy.folder.rglob("*.partial"))
+
+
+def test_a_full_temporary_folder_is_named(
+    comparison: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strides = comparison.strides(comparison.find(controller="pd"))
+    monkeypatch.setattr(tempfile, "tempdir", "/nowhere")
+    with pytest.raises(FileProblem, match=r"^/nowhere: cannot be written .*set TMPDIR$"):
+        encode(strides)
+
+
+def test_a_second_run_in_the_same_folder_is_refused(copy: Results) -> None:
+    with copy.locked():
+        text = message(lambda: copy.locked().__enter__(), copy.folder)
+    assert text == "another run is writing there; wait for it, or end it first"
+    with copy.locked():
+        pass
+
+
+def test_what_a_killed_run_left_half_written_is_cleared_away(copy: Results) -> None:
+    (copy.folder / "strides" / "pd_nominal_0.nc.partial").write_bytes(b"half")
+    (copy.folder / "summary.csv.partial").write_bytes(b"half")
+    with copy.locked():
+        assert not list(copy.folder.rglob("*.partial"))
 
 
 def test_strides_that_cannot_be_written_are_reported_and_leave_nothing(copy: Results) -> None:

@@ -34,7 +34,7 @@ def test_a_run_leaves_strides_summary_and_config_and_nothing_else(comparison: Re
         path.relative_to(comparison.folder).as_posix() for path in comparison.folder.rglob("*")
     }
     strides = {f"strides/{name}_nominal_0.nc" for name in ("pd", "ilc", "library")}
-    assert files == {"config.json", "summary.csv", "strides", *strides}
+    assert files == {"config.json", "provenance.json", "summary.csv", "strides", *strides}
 
 
 @pytest.mark.parametrize("controller", ["pd", "library"])
@@ -63,7 +63,7 @@ def test_a_whole_run_is_summarized_again_but_stays_on_record_as_it_was_made(
     run_experiment(copy.experiment, copy.folder, progress=False)
     assert modified(copy) == before
     assert len(copy.summary()) == len(comparison.summary())
-    assert copy.config == comparison.config
+    assert copy.provenance == comparison.provenance
 
 
 def test_processes_give_the_same_strides_as_one_after_the_other(

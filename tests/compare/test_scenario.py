@@ -102,6 +102,7 @@ def test_a_value_in_a_name_is_the_value_to_the_bit() -> None:
     [
         ("payload+payload", "payload is in it twice"),
         ("payload+payload-front", "two parts of it change payload; keep one"),
+        ("payload+ideal", "a world, as ideal, comes first in a name"),
         ("payload=heavy", "'payload=heavy' needs a number after '=', in kg, as in payload=3"),
         ("payload=nan", "needs a number after '='"),
         ("payload=", "needs a number after '='"),
@@ -171,8 +172,8 @@ def test_a_contact_stiffer_than_the_time_step_allows_is_refused(value: float) ->
         ({"slope": 0.6}, "a slope beyond 0.5 rad is not for legs"),
         ({"slope": math.nan}, "a slope beyond 0.5 rad is not for legs"),
         ({"step_height": 0.2}, "half as high as they are long"),
-        ({"full_torque_speed": 20.0, "no_load_speed": 10.0}, "from 0 to no_load_speed"),
-        ({"full_torque_speed": 20.0, "no_load_speed": 20.0}, "greater than full_torque_speed"),
+        ({"full_torque_speed": 20.0, "no_load_speed": 10.0}, "less than no_load_speed"),
+        ({"full_torque_speed": 20.0, "no_load_speed": 20.0}, "less than no_load_speed"),
         ({"push_duration": 5.0}, "shorter than push_period"),
         ({"payload_position": (0.0, 1.0)}, "payload_position must be three finite numbers"),
         ({"com_shift": (0.0, 0.0, math.nan)}, "com_shift must be three finite numbers"),
@@ -193,3 +194,10 @@ def test_gravity_leans_back_on_a_slope_and_keeps_its_size() -> None:
 def test_noise_may_be_scaled_by_name() -> None:
     twice, once = load_scenario("noise=2").sensors, load_scenario("noise").sensors
     assert twice == once.scaled(2.0) != Sensors()
+
+
+def test_a_scenario_comes_back_from_its_text() -> None:
+    for scenario in (load_scenario("payload=2+noise+slow-motors+slope"), random_scenarios(1, 3)[0]):
+        assert Scenario.from_json(scenario.to_json()) == scenario
+    with pytest.raises(InvalidInput, match="this is not a scenario"):
+        Scenario.from_json("{}")

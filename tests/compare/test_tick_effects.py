@@ -152,3 +152,22 @@ def test_the_same_seed_makes_the_same_noise_for_every_controller(build: Build) -
     np.testing.assert_array_equal(
         first._sensors.encoders(rows, zero, zero), second._sensors.encoders(rows, zero, zero)
     )
+
+
+def test_the_accelerometer_integrates_to_the_change_of_speed(build: Build, robot: Robot) -> None:
+    """Over a stance; in flight it feels nothing but the legs' swing."""
+    simulation = build(load_scenario("nominal"), controller="ilc-imu")
+    liftoff, found = simulation.controller.liftoff, []
+
+    def spy(rows, log):  # type: ignore[no-untyped-def]
+        rate = simulation._log.base_rate[rows]
+        for row, length in enumerate(log.length):
+            force = log.specific_force[row, : length - 1] - [0.0, 0.0, robot.gravity]
+            gained = force.sum(axis=0)[[0, 2]] * 0.001
+            found.append(gained - (rate[row, length - 1] - rate[row, 0]))
+        return liftoff(rows, log)
+
+    simulation.controller.liftoff = spy  # type: ignore[method-assign]
+    simulation.run()
+    assert len(found) > 4
+    np.testing.assert_allclose(found, 0.0, atol=1e-9)

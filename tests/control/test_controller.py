@@ -281,8 +281,7 @@ def test_an_unknown_controller_is_refused_with_the_known_ones() -> None:
     with pytest.raises(UnknownName) as caught:
         load_controller("lqr")
     assert str(caught.value) == (
-        "unknown controller 'lqr'; choose one of: pd, ilc, model, library, model+ilc, ilc-stance, "
-        "ilc-paper, ilc-paper-exact, ilc-current"
+        "unknown controller 'lqr'; choose one of: " + ", ".join(CONTROLLERS)
     )
 
 

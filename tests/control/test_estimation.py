@@ -91,3 +91,47 @@ def test_robots_that_are_not_asked_about_keep_their_estimates(
 def test_a_negative_time_constant_is_refused(robot: Robot) -> None:
     with pytest.raises(InvalidInput, match="must not be negative"):
         SpeedEstimator(robot, 1, time_constant=-0.1, timestep=DT)
+
+
+def speeding_up(
+    robot: Robot, rolling: Callable[..., PhaseLog], rate: float, ticks: int = 160
+) -> tuple[PhaseLog, Array]:
+    """A stance from rest with a constant acceleration, and its speeds [m/s]."""
+    speed = rate * DT * np.arange(1, ticks + 1)
+    log = rolling(1.0, ticks=ticks)
+    log = replace(log, joint_rates=log.joint_rates * speed[:, None])
+    force = np.tile([rate, 0.0, robot.gravity], (1, ticks, 1))
+    return replace(log, specific_force=force), speed
+
+
+def test_with_an_accelerometer_the_filter_does_not_lag_behind(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    log, speed = speeding_up(robot, rolling, 3.0)
+    aided, alone = (
+        SpeedEstimator(robot, 1, time_constant=0.05, timestep=DT).update(np.arange(1), each)[0]
+        for each in (log, replace(log, specific_force=None))
+    )
+    assert aided == pytest.approx(speed[-1], abs=3.0 * DT)
+    assert alone == pytest.approx(speed[-1] - 3.0 * 0.05, rel=0.05)  # the lag of a ramp
+
+
+def test_a_biased_accelerometer_is_off_by_its_bias_times_the_time_constant(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    log = rolling(0.5, ticks=600)
+    force = np.tile([0.2, 0.0, robot.gravity], (1, 600, 1))
+    log = replace(log, specific_force=force)
+    speed = SpeedEstimator(robot, 1, time_constant=0.05, timestep=DT).update(np.arange(1), log)
+    assert speed[0] == pytest.approx(0.5 + 0.05 * 0.2, abs=1e-4)
+
+
+def test_an_accelerometer_that_fails_leaves_the_estimate_as_it_was(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    log, _ = speeding_up(robot, rolling, 3.0)
+    assert log.specific_force is not None
+    log.specific_force[0, 30, 0] = np.nan
+    estimator = SpeedEstimator(robot, 1, time_constant=0.05, timestep=DT)
+    estimator.speed[0] = 0.25
+    assert estimator.update(np.arange(1), log)[0] == 0.25

@@ -1,0 +1,21 @@
+"""What did it learn? The learned torque, taken apart into physics."""
+
+from .describe import describe, foreign, words
+from .explain import Explanation, explain
+from .mend import mended_gaits
+from .shares import explained, share_table
+from .terms import TERMS, Motion, Term
+
+__all__ = [
+    "TERMS",
+    "Explanation",
+    "Motion",
+    "Term",
+    "describe",
+    "explain",
+    "explained",
+    "foreign",
+    "mended_gaits",
+    "share_table",
+    "words",
+]

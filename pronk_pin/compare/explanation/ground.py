@@ -1,0 +1,45 @@
+"""What the standing feet tell of the ground: whether it gives way, and whether it slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kinematics import foot_positions
+from ...robot import Robot
+from .recording import PhaseRecording
+
+_SPAN = 0.3
+"""Distance from which on a slope shows [m]."""
+
+
+class Ground(NamedTuple):
+    """The ground as the feet found it, mean over speeds."""
+
+    sinking: float
+    """By how much the feet sink in after touchdown [m]."""
+    slope: float
+    """Angle by which it rises forwards [rad]; NaN where the robot stayed in one place."""
+
+
+def survey(robot: Robot, stances: Iterable[PhaseRecording]) -> Ground:
+    """Look at the feet of recorded stances.
+
+    Args:
+        robot: The robot.
+        stances: The stance of each speed.
+    """
+    sinking, steps = [], []
+    for phase in stances:
+        place = np.zeros((*phase.joints.shape[:2], 3))
+        place[..., [0, 2]] = phase.base
+        feet = foot_positions(robot, robot.q_from_base(place, phase.joints))  # (k, ticks, 4, 3)
+        height = feet[..., 2].mean(axis=(0, 2))
+        sinking.append(height[0] - height.min())
+        middle = phase.base[:, phase.base.shape[1] // 2]  # (k, 2): it climbs with the ground
+        steps.append(middle - middle.mean(axis=0))
+    x, z = np.concatenate(steps).T
+    rise = float(x @ z / (x @ x)) if np.ptp(x) > _SPAN else np.nan
+    return Ground(float(np.mean(sinking)), float(np.arctan(rise)))

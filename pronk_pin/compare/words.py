@@ -1,0 +1,227 @@
+"""The answer in words and as text for a terminal, computed from the numbers."""
+
+from __future__ import annotations
+
+import itertools
+import textwrap
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from .statistics import CONFIDENCE, control_arm, family
+from .tables import SHOWN, answer, beside_the_paper, overview, worst_reduction
+
+LEARNER = "ilc"
+"""Practice, when it is asked whether it beats the model."""
+
+_WIDTH = 100
+
+
+def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
+    """The answer for one world in words; empty without `pd` and `ilc`."""
+    table = overview(summary, scenario=scenario)
+    if not {"pd", LEARNER} <= set(table.index):
+        return ""
+    practice = table.loc[LEARNER]
+    worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
+    less = " and ".join(
+        f"{_percent(practice, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
+    )
+    settled = (
+        f", within {practice['strides']:.0f} strides at every speed."
+        if np.isfinite(practice["strides"])
+        else "; at some speed it has not settled."
+    )
+    sentences = [
+        f"Practice cuts the mean peak error by {less} against PD ({worst['calf']:.0%} and "
+        f"{worst['thigh']:.0%} at the worst speed){settled}"
+    ]
+    if "model" in table.index:
+        sentences.append(_against_the_model(practice, table.loc["model"]))
+    sentences += [_fallen(table), _control_arm(summary)]
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _against_the_model(practice: pd.Series, model: pd.Series) -> str:
+    wins = [joint for joint in SHOWN if practice[f"{joint}_model"] > 0]
+    open_ = [joint for joint in SHOWN if practice[f"{joint}_model"] == 0]
+    beats = "beats" if wins else "does not beat"
+    where = f" in the {wins[0]} only" if len(wins) == 1 else ""
+    doubt = f" (in the {' and '.join(open_)} the difference may be chance)" if open_ else ""
+    numbers = ", ".join(
+        f"{practice[joint]:.4f} against {model[joint]:.4f} rad in the {joint}" for joint in SHOWN
+    )
+    text = f"It {beats} the model's feedforward{where}{doubt}: {numbers}."
+    if practice["beat"] > 0:
+        text += (
+            f" {practice['beat']:.0f} of {practice['learners']:.0f} robots beat it in both joints, "
+            f"after {practice['beat_strides']:.0f} strides in the median."
+        )
+    return text
+
+
+def _fallen(table: pd.DataFrame) -> str:
+    fallen = int((table["robots"] - table["upright"]).sum())
+    counted = {0: "No robot", 1: "One robot"}.get(fallen, f"{fallen} robots")
+    return f"{counted} fell."
+
+
+def _control_arm(summary: pd.DataFrame) -> str:
+    """What learning with gain 0 shows; empty if it was not run."""
+    largest = control_arm(summary)
+    if largest is None:
+        return ""
+    if largest == 0.0:
+        return "The control arm, learning with gain 0, shows nothing: every number is PD's."
+    return (
+        f"The control arm, learning with gain 0, differs from PD by up to {largest:.2g}: what "
+        "learning shows is not to be trusted beyond that."
+    )
+
+
+def suite_verdict(summary: pd.DataFrame) -> str:
+    """The answer for all worlds in words; empty without `pd`, `ilc` and `model`."""
+    table = answer(summary)
+    controllers = set(table.index.get_level_values("controller"))
+    if not {"pd", LEARNER, "model"} <= controllers:
+        return ""
+    practice = table.xs(LEARNER, level="controller")
+    worlds = len(practice)
+    sentences = [
+        f"Does practice beat the model? In {_count(worlds, 'world')}, against the model's "
+        f"feedforward and beyond doubt ({CONFIDENCE:.0%} intervals of the paired difference):"
+    ]
+    for joint in SHOWN:
+        better, worse, open_ = (
+            list(practice.index[practice[f"{joint}_model"] == sign]) for sign in (1, -1, 0)
+        )
+        parts = [f"in the {joint} it is better in {len(better)} of {worlds}"]
+        parts += [f"worse in {', '.join(worse)}"] if worse else []
+        parts += [f"open in {', '.join(open_)}"] if open_ else []
+        sentences.append("; ".join(parts) + ".")
+    beat, learners = practice["beat"].sum(), practice["learners"].sum()
+    median = practice["beat_strides"].median()
+    sentences.append(
+        f"{beat:.0f} of {learners:.0f} robots come to beat it in both joints and stay there"
+        + (f", the worlds' median is {median:.0f} strides." if beat else ".")
+    )
+    for joint in SHOWN:
+        reduced = practice[f"{joint}_reduction"]
+        best, least = reduced.idxmax(), reduced.idxmin()
+        sentences.append(
+            f"Against PD the {joint}'s mean peak is less by "
+            f"{_percent(practice.loc[least], f'{joint}_reduction')} in {least} to "
+            f"{_percent(practice.loc[best], f'{joint}_reduction')} in {best}."
+        )
+    down = table[table["robots"] > table["upright"]]
+    places = [
+        f"{row['robots'] - row['upright']:.0f} of {row['robots']:.0f} in {scenario} under "
+        f"{controller}"
+        for (scenario, controller), row in down.iterrows()
+    ]
+    sentences.append(f"Robots fell: {', '.join(places)}." if places else "No robot fell.")
+    sentences.append(_control_arm(summary))
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
+    """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
+    table = overview(summary, scenario=scenario)
+    single = bool((summary["scenario"] == scenario).any())
+    parts = [
+        _format_beside(beside_the_paper(summary, scenario=scenario)) if single else "",
+        format_overview(table),
+        textwrap.fill(verdict(summary, scenario=scenario), _WIDTH),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def format_suite(summary: pd.DataFrame) -> str:
+    """The overviews of all worlds and the verdict over them, as text for a terminal."""
+    table = answer(summary)
+    parts = []
+    for scenario in dict.fromkeys(table.index.get_level_values("scenario")):
+        parts.append(f"{scenario}\n{format_overview(table.loc[scenario])}")
+    return "\n\n".join([*parts, textwrap.fill(suite_verdict(summary), _WIDTH)])
+
+
+def _format_beside(table: pd.DataFrame) -> str:
+    lines = [
+        " " * 8 + "".join(f"{f'{joint}: peak stance error [rad]':^44}" for joint in SHOWN),
+        f"{'speed':>6}  " + f"{'this run':^22}{'paper, Table I':^22}" * len(SHOWN),
+        f"{'[m/s]':>6}" + f"{'PD':>8}{'ILC':>7}{'less':>7}" * 2 * len(SHOWN),
+    ]
+    for speed, row in table.iterrows():
+        cells = ""
+        for joint, source in itertools.product(SHOWN, ("ours", "paper")):
+            pd_, ilc, less = (
+                row.get((joint, source, name), np.nan) for name in ("PD", "ILC", "reduction")
+            )
+            cells += f"{number(pd_, '.3f'):>8}{number(ilc, '.3f'):>7}{number(less, '.0%'):>7}"
+        lines.append(f"{speed if isinstance(speed, str) else f'{speed:.2g}':>6}{cells}")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def format_overview(table: pd.DataFrame) -> str:
+    """An `overview` as text: peaks with their intervals, and against the model."""
+    lines = [
+        f"{'':>10}  {'calf: peak [rad]':^23} {'thigh: peak [rad]':^23}  beats model  strides to"
+        "  feedb.  cost of  stayed",
+        f"{'controller':>10}  {'mean':>6} {'95 % interval':>16} {'mean':>6} {'95 % interval':>16}  "
+        f"{'calf/thigh':>11}  {'beat it':>10}  {'share':>6}  {'transp.':>7}  upright",
+    ]
+    for name, row in table.iterrows():
+        cells = " ".join(f"{row[joint]:6.4f} {between(row, joint, '.4f'):>16}" for joint in SHOWN)
+        lines.append(
+            f"{name:>10}  {cells}  {against_model(row):>11}  {beat_text(row):>10}  "
+            f"{number(row['feedback'], '.0%'):>6}  {number(row['cost'], '.2f'):>7}  "
+            f"{row['upright']:.0f} of {row['robots']:.0f}"
+        )
+    units = sorted(set(table["unit"]))
+    lines.append(f"{'':>10}  intervals over the {'s and '.join(units)}s")
+    return "\n".join(lines)
+
+
+def against_model(row: pd.Series) -> str:
+    """Whether calf and thigh are better than with the model's feedforward: yes, no, or open."""
+    if any(np.isnan(row.get(f"{joint}_model", np.nan)) for joint in SHOWN):
+        return "-"
+    return "/".join({1: "yes", 0: "open", -1: "no"}[int(row[f"{joint}_model"])] for joint in SHOWN)
+
+
+def beat_text(row: pd.Series) -> str:
+    """Strides until the model is beaten, and by how many robots; "never" where by none."""
+    if not row["learners"]:
+        return "-"
+    if not row["beat"]:
+        return "never"
+    everyone = row["beat"] == row["learners"]
+    few = "" if everyone else f" ({row['beat']:.0f}/{row['learners']:.0f})"
+    return f"{row['beat_strides']:.0f}{few}"
+
+
+def between(row: pd.Series, name: str, form: str) -> str:
+    """An interval, as "0.0210 to 0.0232"; a dash without one."""
+    ends = row.get(f"{name}_low", np.nan), row.get(f"{name}_high", np.nan)
+    return f"{ends[0]:{form}} to {ends[1]:{form}}" if np.isfinite(ends).all() else "-"
+
+
+def number(value: float, form: str) -> str:
+    """A number, or a dash where there is none."""
+    return format(value, form) if np.isfinite(value) else "-"
+
+
+def _percent(row: pd.Series, name: str) -> str:
+    ends = row[f"{name}_low"], row[f"{name}_high"]
+    interval = f" ({100 * ends[0]:.0f} to {ends[1]:.0%})" if np.isfinite(ends).all() else ""
+    return f"{row[name]:.0%}{interval}"
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}" + ("s" if n != 1 else "")
+
+
+def families(scenarios: Sequence[str]) -> list[str]:
+    """The worlds of an experiment, sampled ones as one family each."""
+    return list(dict.fromkeys(map(family, scenarios)))

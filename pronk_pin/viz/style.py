@@ -1,0 +1,196 @@
+"""One look for every figure: colours, line styles, sizes, formats.
+
+Colours are those of Okabe and Ito, which readers with any colour vision tell apart; controllers
+differ in line style and marker too, so that a black and white print can be read. Sizes are those
+of an IEEE column and page; letters are 8 points in print.
+"""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from ..errors import InvalidInput, cannot_write
+
+PALETTE = {
+    "black": "#000000",
+    "orange": "#E69F00",
+    "sky": "#56B4E9",
+    "green": "#009E73",
+    "yellow": "#F0E442",
+    "blue": "#0072B2",
+    "vermilion": "#D55E00",
+    "purple": "#CC79A7",
+    "grey": "#737373",
+}
+"""The colours by name; yellow is too light for lines on white."""
+
+REFERENCE, ACCENT = PALETTE["grey"], PALETTE["vermilion"]
+"""Colours of references, and of events and limits."""
+
+SEQUENTIAL, DIVERGING = "viridis", "PuOr_r"
+"""Colour maps: for magnitudes, and for differences around zero."""
+
+ONE_COLUMN, TWO_COLUMNS = 3.5, 7.16
+"""Widths of a column and of a page [in]."""
+
+FORMATS = ("png", "svg", "pdf")
+"""Formats that figures are written in."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a controller is drawn.
+
+    Attributes:
+        label: Its name in words.
+        color: Its colour.
+        line: Line style, as matplotlib takes it.
+        marker: Marker.
+    """
+
+    label: str
+    color: str
+    line: str | tuple[int, tuple[float, ...]] = "-"
+    marker: str = "o"
+
+    @property
+    def curve(self) -> dict[str, Any]:
+        """Colour, line style and label, as arguments of `plot`."""
+        return {"color": self.color, "ls": self.line, "label": self.label}
+
+
+_DASHED, _DASH_DOT, _SHORT = (0, (5, 2)), (0, (5, 1.5, 1, 1.5)), (0, (2.5, 1.5))
+
+LOOKS = {
+    "pd": Look("PD", PALETTE["black"], "-", "x"),
+    "model": Look("PD + model", PALETTE["orange"], _DASH_DOT, "s"),
+    "library": Look("PD + library", PALETTE["sky"], _SHORT, "^"),
+    "ilc": Look("ILC", PALETTE["blue"], "-", "o"),
+    "model+ilc": Look("ILC seeded by the model", PALETTE["green"], _DASHED, "D"),
+    "ilc-paper": Look("ILC, the paper's law", PALETTE["vermilion"], _DASH_DOT, "v"),
+    "identified": Look("PD + identified model", PALETTE["grey"], _DASHED, "P"),
+    "identified+gait": Look("PD + identified model, gaits again", PALETTE["purple"], "-", "*"),
+    "paper": Look("paper", PALETTE["purple"], "", "+"),
+}
+"""Looks by controller, in the order of legends; "paper" are the paper's own numbers."""
+
+_OTHERS = (
+    ("vermilion", _SHORT, "P"),
+    ("purple", _DASHED, "*"),
+    ("grey", "-", "d"),
+    ("sky", _DASHED, "h"),
+    ("green", _SHORT, "<"),
+    ("orange", _DASHED, ">"),
+)
+
+_RC: dict[Any, Any] = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "figure.titlesize": 9.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "legend.fontsize": 7.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.5,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 3.5,
+    "figure.constrained_layout.use": True,
+    "svg.hashsalt": "pronk_pin",  # the same bytes each time
+    "pdf.fonttype": 42,  # TrueType, which publishers ask for
+}
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def styled(draw: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Have a function that makes a figure do so in this style; the caller's own stays untouched."""
+
+    @functools.wraps(draw)
+    def inner(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        with rc_context(_RC):
+            return draw(*args, **kwargs)
+
+    return inner
+
+
+def look(controller: str) -> Look:
+    """How a controller is drawn; one that has no look of its own gets one by its name."""
+    if controller in LOOKS:
+        return LOOKS[controller]
+    color, line, marker = _OTHERS[sum(controller.encode()) % len(_OTHERS)]
+    return Look(controller, PALETTE[color], line, marker)
+
+
+def in_order(controllers: Iterable[str]) -> list[str]:
+    """Controllers in the order of the legends: those of `LOOKS`, then any others by name."""
+    order = list(LOOKS)
+    return sorted(set(controllers), key=lambda c: (order.index(c) if c in order else len(order), c))
+
+
+def known_format(suffix: str) -> str:
+    """The format itself, if figures can be written in it.
+
+    Raises:
+        InvalidInput: They cannot.
+    """
+    if suffix not in FORMATS:
+        raise InvalidInput(f"figures cannot be written as '{suffix}'; choose {', '.join(FORMATS)}")
+    return suffix
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of a size [in] that lays itself out."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def legend_below(figure: Figure, handles: Iterable[Any], labels: Iterable[str]) -> None:
+    """One legend for all panels, under them."""
+    shown = list(labels)
+    columns = min(len(shown), 4)
+    figure.legend(list(handles), shown, loc="outside lower center", ncols=columns)
+
+
+def figure_bytes(figure: Figure, suffix: str) -> bytes:
+    """A figure as a file of that format, the same bytes each time.
+
+    Raises:
+        InvalidInput: The format is unknown.
+    """
+    known_format(suffix)
+    undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": None}
+    buffer = io.BytesIO()
+    with rc_context(_RC):
+        figure.savefig(buffer, format=suffix, dpi=200, metadata=undated[suffix])
+    return buffer.getvalue()
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure in the format of the path's suffix, and make its folder.
+
+    Raises:
+        InvalidInput: The format is unknown.
+        FileProblem: It cannot be written.
+    """
+    data = figure_bytes(figure, path.suffix.removeprefix("."))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+    except OSError as error:
+        raise cannot_write(path, error, "choose another folder") from error
+    return path
