@@ -62,6 +62,7 @@ class TickLog:
         self.base, self.base_rate = np.zeros((2, n, size, 2))
         self.force = np.zeros((n, size, NL // 3, 3))
         self.pose, self.twist = np.zeros((n, size, 7)), np.zeros((n, size, 6))
+        self.pose[..., 6] = 1.0  # level, until something else is written
 
     def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
         """What robots did from a tick on."""
