@@ -7,6 +7,7 @@ import html
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from string import Template
 from typing import Literal
 
@@ -17,14 +18,15 @@ from .style import figure_bytes
 
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>$title</title><style>
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 64rem; margin: 2rem auto; padding: 0 1rem;
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 2rem auto; padding: 0 1rem;
   color: #222; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; } h3 { font-size: 1rem; }
 h2 a, h3 a { color: inherit; text-decoration: none; } h2 a:hover, h3 a:hover { color: #0072B2; }
-nav { font-size: 13px; columns: 3; } nav a { display: block; color: #0072B2; }
+nav { font-size: 13px; columns: 2; margin: 1rem 0; } nav a { display: block; color: #0072B2; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 13px; }
-th, td { padding: .15rem .6rem; text-align: right; white-space: nowrap; }
+table { margin: .6rem 0; }
+th, td { padding: .15rem .6rem; text-align: right; } td { white-space: nowrap; }
 th:first-child, .left td { text-align: left; } .left td { white-space: normal; }
 thead th { border-bottom: 1px solid #888; } tbody { border-bottom: 1px solid #888; }
 .verdict { background: #eef4fa; border-left: 4px solid #0072B2; padding: .6rem 1rem; }
@@ -67,6 +69,10 @@ class _Picture:
     name: str
     figure: Figure
     caption: str
+
+    @cached_property
+    def svg(self) -> bytes:
+        return figure_bytes(self.figure, "svg")
 
 
 @dataclass
@@ -123,9 +129,7 @@ class Document:
     def pictures(self) -> dict[str, bytes]:
         """The figures as SVG, by the names of their files."""
         return {
-            f"{block.name}.svg": figure_bytes(block.figure, "svg")
-            for block in self._blocks
-            if isinstance(block, _Picture)
+            f"{block.name}.svg": block.svg for block in self._blocks if isinstance(block, _Picture)
         }
 
 
@@ -149,7 +153,7 @@ def _html(block: _Heading | _Text | _Bullets | _Table | _Picture) -> str:
         kind = "table left" if block.left else "table"
         table = block.cells.to_html(border=0, header=not block.left)
         return f'<div class="{kind}">{table}</div>'
-    data = base64.b64encode(figure_bytes(block.figure, "svg")).decode()
+    data = base64.b64encode(block.svg).decode()
     caption = html.escape(block.caption)
     return (
         f'<figure id="figure-{block.name}"><img alt="{caption}" '

@@ -90,10 +90,10 @@ def report(results: Results) -> Document:
     document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
     table = answer(summary)
     if len(worlds) > 1:
-        document.text(suite_verdict(summary), "verdict")
+        document.text(suite_verdict(summary, table=table), "verdict")
         _all_worlds(document, results, table)
     else:
-        document.text(verdict(summary, scenario=worlds[0]), "verdict")
+        document.text(verdict(summary, scenario=worlds[0], table=table.loc[worlds[0]]), "verdict")
     for world in worlds:
         _world(document, results, summary, table, world)
     document.heading("How to read the numbers", "statistics")
@@ -204,13 +204,18 @@ def _world_rows(table: pd.DataFrame) -> pd.DataFrame:
             for other in ("pd", RIVAL):
                 if (world, other) in table.index:
                     value = table.loc[(world, other), joint]
-                    cells[f"{joint}: {figures.LABELS[other]}"] = number(value, ".4f")
-            cells[f"{joint}: ILC"] = number(row[joint], ".4f")
-            cells[f"{joint}: interval"] = between(row, joint, ".4f")
+                    cells[f"{joint} [rad]: {figures.LABELS[other]}"] = number(value, ".4f")
+            cells[f"{joint} [rad]: ILC"] = _with_interval(row, joint, ".4f")
         cells["better than model (calf/thigh)"] = against_model(row)
         cells["strides to beat it"] = beat_text(row)
         rows[str(world)] = cells
     return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def _with_interval(row: pd.Series, name: str, form: str) -> str:
+    """A mean with its interval: "0.0224 (0.0216 to 0.0237)"."""
+    value, ends = number(row.get(name, float("nan")), form), between(row, name, form)
+    return value if ends == "-" else f"{value} ({ends})"
 
 
 def _world(
@@ -220,8 +225,9 @@ def _world(
     worlds = families(results.experiment.scenarios)
     document.heading(f"Controllers in the world `{world}`".replace("`", '"'), world)
     if len(worlds) > 1:
-        document.text(verdict(summary, scenario=world))
-    document.table(_overview(table.loc[world]))
+        document.text(verdict(summary, scenario=world, table=table.loc[world]))
+    document.table(_errors(table.loc[world]))
+    document.table(_motion(table.loc[world]))
     units = sorted(set(table.loc[world]["unit"]))
     document.text(f"Intervals are drawn over the {' and '.join(units)}s.", "note")
     if world != worlds[0] or world not in results.experiment.scenarios:
@@ -244,22 +250,25 @@ def _world(
                 document.picture(name, found[name], _CAPTIONS[name])
 
 
-def _overview(table: pd.DataFrame) -> pd.DataFrame:
+def _errors(table: pd.DataFrame) -> pd.DataFrame:
+    """Errors of the controllers in a world, with intervals."""
     rows = {}
     for name, row in table.iterrows():
         cells: dict[str, str] = {}
         for joint in SHOWN:
-            cells[f"{joint} peak [rad]"] = number(row[joint], ".4f")
-            cells[f"{joint} interval"] = between(row, joint, ".4f")
-            cells[f"{joint} less than PD"] = number(
-                row.get(f"{joint}_reduction", float("nan")), ".0%"
-            )
-            cells[f"{joint}: of which sure"] = between(row, f"{joint}_reduction", ".0%")
-            cells[f"{joint} RMS [rad]"] = number(row[f"{joint}_rms"], ".4f")
+            cells[f"{joint}: peak [rad]"] = _with_interval(row, joint, ".4f")
+            cells[f"{joint}: less than PD"] = _with_interval(row, f"{joint}_reduction", ".0%")
+            cells[f"{joint}: wins against model"] = _with_interval(row, f"{joint}_wins", ".0%")
+        rows[figures.LABELS.get(str(name), str(name))] = cells
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def _motion(table: pd.DataFrame) -> pd.DataFrame:
+    """What else is to be known of the controllers in a world."""
+    rows = {}
+    for name, row in table.iterrows():
+        cells = {f"{joint}: RMS [rad]": number(row[f"{joint}_rms"], ".4f") for joint in SHOWN}
         cells["better than model (calf/thigh)"] = against_model(row)
-        for joint in SHOWN:
-            wins = number(row.get(f"{joint}_wins", float("nan")), ".0%")
-            cells[f"{joint} wins"] = f"{wins} ({between(row, f'{joint}_wins', '.0%')})"
         cells["strides to beat it"] = beat_text(row)
         cells["strides to converge"] = number(row["strides"], ".0f")
         cells["feedback's share"] = number(row["feedback"], ".0%")
