@@ -79,7 +79,11 @@ class Experiment:
         for speed in self.speeds:
             library.at(speed)
         for controller in self.controllers:
-            load_controller(controller)
+            if load_controller(controller).source == "identified" and self.base != "locked":
+                raise InvalidInput(
+                    f"controller '{controller}' identifies the robot on the locked base; leave it "
+                    "out, or use base 'locked'"
+                )
         if min(self.seeds) < 0:
             raise InvalidInput("seeds must not be negative")
         if self.world:
@@ -172,7 +176,7 @@ def run_cell(
         scenario,
         schedule=cell.schedule,
         rng=rng,
-        feedforward=_feedforward(spec, cell.base, mended, gaits, practised),
+        feedforward=_feedforward(spec, mended, gaits, practised, cell.base),
         base=cell.base,
     )
     log = simulation.run(progress)
@@ -193,10 +197,10 @@ def torque_library(strides: xr.Dataset) -> TorqueLibrary:
 
 def _feedforward(
     spec: ControllerSpec,
-    base: str,
     robot: Robot,
     gaits: Sequence[Gait],
     practised: xr.Dataset | None,
+    base: str,
 ) -> Array | None:
     """The feedforward that a controller begins with [N m], (n, 2, samples, 12)."""
     if spec.source in ("model", "identified"):

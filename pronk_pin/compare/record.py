@@ -62,6 +62,7 @@ class TickLog:
         self.base, self.base_rate = np.zeros((2, n, size, 2))
         self.force = np.zeros((n, size, NL // 3, 3))
         self.pose, self.twist = np.zeros((n, size, 7)), np.zeros((n, size, 6))
+        self.pose[..., 6] = 1.0  # level, until something else is written
 
     def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
         """What robots did from a tick on."""
@@ -100,9 +101,9 @@ class TickLog:
             self.missing[rows, ticks],
             length,
             felt,
-            self.force[rows, ticks, :, 2].sum(axis=-1),
-            self.pose[rows, ticks],
-            self.twist[rows, ticks],
+            load=self.force[rows, ticks, :, 2].sum(axis=-1),
+            pose=self.pose[rows, ticks],
+            twist=self.twist[rows, ticks],
         )
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:

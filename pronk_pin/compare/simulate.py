@@ -125,11 +125,6 @@ class Simulation:
         chunked: bool = True,
         threads: int = 0,
     ) -> None:
-        if spec.imu and base != "locked":
-            raise InvalidInput(
-                f"controller '{spec.name}' reads the IMU as of a level trunk; use another one, or "
-                "base 'locked'"
-            )
         n, dt = len(gaits), scenario.timestep
         self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
         self.controller = Controller(
@@ -222,8 +217,8 @@ class Simulation:
         flight = self._play(rows, tape, part=1) - late
         duration, upright = self._seconds(stance + flight), self.upright[rows]
         tilt = np.maximum(tilt, self._tilt(1, rows, flight))
-        measured = self._measured(rows, flight)
-        record = controller.landing(rows, measured, duration, upright, tilt)
+        known = self._measured(rows, flight)
+        record = controller.landing(rows, known, duration, upright, tilt)
         if seen is not log:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)

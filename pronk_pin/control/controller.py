@@ -207,17 +207,17 @@ class Controller:
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
         self._laws = list(spec.laws)
+        self._base = base
         for law in self._laws:
             learning_filter = getattr(law, "filter", None)
             if isinstance(learning_filter, ZeroPhaseFilter):
                 learning_filter.warn()
-        self._base = base
+        if base != "locked" and (spec.imu or isinstance(spec.law, ModelBasedILC)):
+            raise InvalidInput(
+                f"controller '{spec.name}' has an IMU or a law with a model that count on a level "
+                "trunk; use another controller, or base 'locked'"
+            )
         if isinstance(spec.law, ModelBasedILC):
-            if base != "locked":
-                raise InvalidInput(
-                    f"controller '{spec.name}' learns by a model of the locked base; use another "
-                    "law, or base 'locked'"
-                )
             settings = Settings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
             )

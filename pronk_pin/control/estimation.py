@@ -59,14 +59,15 @@ class SpeedEstimator:
         velocity = leg_odometry(
             self._robot, q.reshape(n * ticks, -1), v.reshape(n * ticks, -1), contact="rolling"
         )
-        velocity = velocity.reshape(n, ticks, 3)
+        forward = velocity[:, 0].reshape(n, ticks)
         if log.specific_force is not None:  # gravity does not show in x: the base is level
-            velocity[..., 0] += self._time_constant * log.specific_force[:, :ticks, 0]
-            sound &= np.isfinite(velocity[..., 0]) | ~used
-            velocity = np.where(used[..., None], velocity, 0.0)
-        for axis, speeds in enumerate((self.speed, self.sideways)):
+            forward = forward + self._time_constant * log.specific_force[:, :ticks, 0]
+            sound &= np.isfinite(forward) | ~used
+            forward = np.where(used, forward, 0.0)
+        aside = velocity[:, 1].reshape(n, ticks)
+        for measured, speeds in ((forward, self.speed), (aside, self.sideways)):
             filtered = first_order(
-                velocity[..., axis],
+                measured,
                 speeds[rows],
                 time_constant=self._time_constant,
                 timestep=self._timestep,

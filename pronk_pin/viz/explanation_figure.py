@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..compare.explanation import Explanation
 from ..compare.explanation.shares import discrepancy
-from ..errors import cannot_write
+from .style import new_figure, save_figure, styled
 
 COLORS = {
     "armature": "#0072B2",
@@ -28,6 +28,7 @@ _JOINTS = ("thigh", "calf")
 _LEG = "FL"
 
 
+@styled
 def explanation_figure(explanation: Explanation, *, speed: float | None = None) -> Figure:
     """One speed's discrepancy by cause, in stance and flight, and all parameters.
 
@@ -35,7 +36,7 @@ def explanation_figure(explanation: Explanation, *, speed: float | None = None) 
         explanation: The explanation.
         speed: Which speed [m/s]; by default the one nearest to 0.5.
     """
-    figure = Figure(figsize=(10.0, 6.0), layout="constrained")
+    figure = new_figure(10.0, 6.0)
     grid = figure.add_gridspec(2, 3, width_ratios=[1.2, 1.2, 1.0])
     found = explanation.shares.sel(speed=0.5 if speed is None else speed, method="nearest")
     for row, joint in enumerate(_JOINTS):
@@ -62,17 +63,10 @@ def write_explanation_figure(
     """Write the figure; the name's ending says how: png, svg or pdf.
 
     Raises:
+        InvalidInput: The format is unknown.
         FileProblem: It cannot be written.
     """
-    path = Path(path)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        explanation_figure(explanation, speed=speed).savefig(path, dpi=150)
-    except (OSError, ValueError) as error:
-        raise cannot_write(path, error, "choose another place; png, svg and pdf are known") from (
-            error
-        )
-    return path
+    return save_figure(explanation_figure(explanation, speed=speed), Path(path))
 
 
 def _stacked(axes: Axes, explanation: Explanation, speed: float, part: str, joint: str) -> None:

@@ -36,7 +36,7 @@ from pronk_pin.compare.explanation.terms import Motion, parameters, truth
 from pronk_pin.compare.strides import to_dataset
 from pronk_pin.control import load_controller
 from pronk_pin.dynamics import contact_jacobian
-from pronk_pin.errors import FileProblem, InvalidInput
+from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import load_library
 from pronk_pin.viz.explanation_figure import write_explanation_figure
 
@@ -386,7 +386,7 @@ def test_what_cannot_be_explained_is_refused(practised: xr.Dataset, found: Expla
         explain(practised.assign_attrs(base="free"))
     with pytest.raises(InvalidInput, match="2 gaits for 3 speeds"):
         explain(practised, gaits=[load_library("a1").at(v) for v in (0.1, 0.2)])
-    with pytest.raises(FileProblem, match=r"cannot be written .*png, svg and pdf are known"):
+    with pytest.raises(InvalidInput, match=r"'txtt'; choose png, svg, pdf"):
         write_explanation_figure(found, Path("figure.txtt"))
 
 
