@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import warnings
 from dataclasses import dataclass, field
@@ -28,6 +29,7 @@ from .compare.changes import format_changes
 from .compare.closing import close_loop, format_loop
 from .compare.gains import describe_gains, sweep_gains
 from .compare.prediction import compare_prediction, describe_prediction, practise
+from .compare.reproduce import format_reproduction
 from .compare.scenario import load_scenario
 from .compare.suites import SUITES, load_suite
 from .compare.transfer import describe_transfers, measure_transfers
@@ -84,6 +86,30 @@ class Compare:
         print(f"robot {self.experiment.robot}, base {self.experiment.base}\n")
         _print_tables(results)
         _write_pages(results)
+
+
+@dataclass(frozen=True)
+class Reproduce:
+    """Print the paper's Table I row by row beside ours, and which of its metrics could be meant.
+
+    Runs the suite "paper": PD, ILC and the paper's own law at its speeds, with several seeds.
+    """
+
+    folder: Path | None = None
+    """Results folder; by default results/<time>-paper. One that is there is completed."""
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    """Seeds of the scatter at the start; intervals need five."""
+    workers: int | None = None
+    """Processes; by default one for each core."""
+
+    def run(self) -> None:
+        """Do it."""
+        experiment = dataclasses.replace(load_suite("paper"), seeds=self.seeds)
+        folder = self.folder or default_folder("paper")
+        results = run_experiment(experiment, folder, workers=self.workers)
+        learners = tuple(name for name in experiment.controllers if name != "pd")
+        print(format_reproduction(results, learners=learners))
+        print(f"\nresults  {results.folder}")
 
 
 @dataclass(frozen=True)
@@ -532,6 +558,7 @@ Command = (
     | Annotated[Ilc, subcommand("ilc")]
     | Annotated[View, subcommand("view")]
     | Annotated[Report, subcommand("report")]
+    | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Explain, subcommand("explain")]
     | Annotated[Parity, subcommand("parity")]
 )

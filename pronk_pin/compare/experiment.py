@@ -230,4 +230,5 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "world": cell.world,
         "world_sha256": world,
         "timestep": scenario.timestep,
+        "switch": cell.schedule.practice,
     }

@@ -60,6 +60,10 @@ def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
             f"{len(results.experiment.speeds)} speeds. They say how the mean would scatter over "
             "speeds and starting postures like these, not over other worlds."
         )
+    yield (
+        "Seeds differ in the starting posture alone where the world is not sampled and has no "
+        "noise; a steady gait forgets it, and intervals over such seeds are small."
+    )
     pairs = summary.groupby(["scenario", "controller"]).ngroups * len(SHOWN)
     yield (
         f"Each interval holds its value with {CONFIDENCE:.0%}; of the {pairs} mean errors here, "

@@ -19,6 +19,10 @@ STEADY_STRIDES = 30
 SETTLED = 0.1
 """Learning has settled where this share of the improvement, or less, is still missing."""
 
+LEAST_IMPROVEMENT = 0.05
+"""Share of the error that learning must take away for there to be anything that settles; a robot
+that learns nothing still drifts by a percent."""
+
 KEYS = ["robot", "base", "scenario", "speed", "controller", "seed", "joint", "metric"]
 COLUMNS = [*KEYS, "value", "unit"]
 """Columns of the summary; rows are sorted by the keys."""
@@ -27,14 +31,24 @@ COLUMNS = [*KEYS, "value", "unit"]
 def steady(strides: xr.Dataset) -> xr.Dataset:
     """The last `STEADY_STRIDES` finished strides of each speed, renumbered from 0.
 
-    Where a law learned, none from before it was switched on: fewer, then, after a short learning.
+    None from before the learning was switched on, or would have been for a controller that does
+    not learn, so that all are judged on the same strides: fewer, then, after a short learning.
     """
     count = strides["count"].to_numpy()
-    learned = (strides["learning"] == 1).sum("stride").to_numpy()
+    learned = _switched(strides).sum(axis=1)
     last = min(STEADY_STRIDES, int(np.where(learned > 0, learned, count).min()))
     offset = xr.DataArray(np.arange(last), dims="stride")
     start = xr.DataArray(count - last, dims="speed", coords={"speed": strides["speed"]})
     return strides.isel(stride=start + offset)
+
+
+def _switched(strides: xr.Dataset) -> BoolArray:
+    """Which strides began after the learning was switched on, or would have been, (n, strides)."""
+    if "start" not in strides or "switch" not in strides.attrs:
+        return np.asarray(strides["learning"].transpose("speed", "stride") == 1)
+    early = float(strides.attrs["timestep"]) / 2
+    start = strides["start"].transpose("speed", "stride").to_numpy()
+    return np.asarray(start > float(strides.attrs["switch"]) - early)
 
 
 def by_joint(values: xr.DataArray) -> xr.DataArray:
@@ -80,12 +94,12 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
     }
     stance = strides[["feedback", "feedforward"]].sel(part="stance")
     torques = {str(name): _array(stance[name], "phase", "joint") for name in stance}
-    spent = effort(strides)
+    spent, switched = effort(strides), _switched(strides)
     rows = []
     for k, speed in enumerate(strides["speed"].to_numpy()):
         count = int(strides["count"][k])
         learning = scalars["learning"][k, :count] == 1
-        last = min(STEADY_STRIDES, int(learning.sum()) or count)
+        last = min(STEADY_STRIDES, int(switched[k, :count].sum()) or count)
         end = slice(count - last, count)
         planned = {"mean_speed": speed, "apex": float(strides["planned_apex"][k])}
         found = [
@@ -173,7 +187,7 @@ def _converged(peak: Array, learning: BoolArray) -> float:
 
 def settling_stride(peak: Array, before: float, final: float) -> float:
     """Number of strides (1 is the first) after which the peaks have settled; NaN if never."""
-    if not final < before or peak.size == 0:
+    if not final < (1.0 - LEAST_IMPROVEMENT) * before or peak.size == 0:
         return float("nan")
     outside = np.flatnonzero(peak > final + SETTLED * (before - final))
     if outside.size == 0:

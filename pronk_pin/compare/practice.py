@@ -18,7 +18,7 @@ RIVAL = "model"
 JUDGED = ("calf", "thigh")
 """Joints whose error counts."""
 
-VARIABLES = ("count", "peak_error", "learning", "upright")
+VARIABLES = ("count", "start", "peak_error", "learning", "upright")
 """What of the strides `practice` reads."""
 
 WINDOW = 5

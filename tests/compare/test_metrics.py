@@ -133,6 +133,18 @@ def test_the_steady_state_of_a_short_learning_holds_no_stride_of_practice(
     assert np.all(end["learning"] == 1.0)
 
 
+def test_who_does_not_learn_is_judged_on_the_same_strides_as_who_does(
+    made: Callable[..., xr.Dataset],
+) -> None:
+    for controller in ("pd", "ilc"):
+        strides = made(learned(8), controller=controller)
+        strides["start"] = (("speed", "stride"), 0.4 * np.arange(PRACTICE + 8.0)[None])
+        strides.attrs |= {"switch": 0.4 * PRACTICE, "timestep": 0.001}
+        assert steady(strides).sizes["stride"] == 8
+        strides.attrs["switch"] = 1000.0  # never
+        assert steady(strides).sizes["stride"] == STEADY_STRIDES
+
+
 def test_a_short_simulation_is_steady_as_a_whole(made: Callable[..., xr.Dataset]) -> None:
     assert steady(made(np.full(7, 0.1), controller="pd")).sizes["stride"] == 7
 
@@ -164,6 +176,10 @@ def test_learning_has_settled_once_the_peak_stays_near_its_final_value(
 def test_learning_that_makes_it_worse_never_settles() -> None:
     assert np.isnan(settling_stride(np.array([0.1, 0.1]), before=0.1, final=0.1))
     assert np.isnan(settling_stride(np.array([0.2, 0.2]), before=0.1, final=0.2))
+
+
+def test_a_drift_of_a_percent_is_nothing_that_settles() -> None:
+    assert np.isnan(settling_stride(np.array([0.099, 0.099]), before=0.1, final=0.099))
 
 
 @pytest.mark.parametrize("joint", ["thigh", "calf"])

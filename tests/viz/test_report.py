@@ -1,0 +1,115 @@
+"""The report of a small result over two worlds."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from pronk_pin import cli
+from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
+from pronk_pin.compare.limits import limitations
+from pronk_pin.compare.suites import SUITES, load_suite
+from pronk_pin.errors import FileProblem
+from pronk_pin.viz.report import command, write_report
+
+EXPERIMENT = Experiment(
+    speeds=(0.0, 0.4),
+    controllers=("pd", "ilc", "model", "ilc-zero"),
+    scenarios=("nominal", "payload"),
+    schedule=Schedule(startup=0.2, practice=2.0, learning=4.0),
+)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("report") / "result"
+    results = run_experiment(EXPERIMENT, folder, workers=1, progress=False)
+    write_report(results)
+    return results
+
+
+def test_the_report_answers_first_and_says_where_its_numbers_are_from(result: Results) -> None:
+    text = (result.folder / "report.html").read_text()
+    assert text.index("Does practice beat the model? In 2 worlds") < text.index("<nav>")
+    for anchor in ("worlds", "nominal", "payload", "statistics", "limits", "provenance"):
+        assert f'id="{anchor}"' in text
+        assert f'href="#{anchor}"' in text
+    for known in ("mujoco 4", "BCa", "figure-heat-map", "figure-practice-calf"):
+        assert known in text
+    assert "nan" not in re.sub(r"data:image[^\"]*|provenance", "", text)
+
+
+def test_the_control_arm_shows_nothing_to_the_bit(result: Results) -> None:
+    summary = result.summary()
+    keys = ["scenario", "speed", "joint", "metric"]
+    arms = [
+        summary[summary["controller"] == name].set_index(keys)["value"]
+        for name in ("pd", "ilc-zero")
+    ]
+    common = arms[0].index.intersection(arms[1].index)
+    assert len(common) == len(arms[0])
+    pd.testing.assert_series_equal(arms[0].loc[common], arms[1].loc[common], rtol=0.0, atol=0.0)
+    zero = summary[summary["controller"] == "ilc-zero"]
+    never = zero[zero["metric"].isin(["strides_to_converge", "strides_to_beat_model"])]
+    assert len(never)
+    assert never["value"].isna().all()
+    assert "shows nothing: every number is PD's" in (result.folder / "report.md").read_text()
+
+
+def test_markdown_shows_figures_that_are_there(result: Results) -> None:
+    text = (result.folder / "report.md").read_text()
+    pictures = re.findall(r"\]\((figures/[^)]+)\)", text)
+    assert len(pictures) >= 8
+    for picture in pictures:
+        assert (result.folder / picture).stat().st_size > 1000, picture
+
+
+def test_the_same_result_gives_the_same_report(result: Results, tmp_path: Path) -> None:
+    copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
+    write_report(copy)
+    for name in ("report.html", "report.md"):
+        assert (copy.folder / name).read_bytes() == (result.folder / name).read_bytes()
+
+
+def test_the_command_makes_the_same_experiment_again(
+    result: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[Experiment] = []
+    monkeypatch.setattr(cli.Compare, "run", lambda self: found.append(self.experiment))
+    for experiment in (result.experiment, *map(load_suite, SUITES)):
+        words = shlex.split(command(Results(result.folder, experiment)))
+        assert words[0] == "pronk-pin"
+        assert cli.main(words[1:]) == 0
+        assert found.pop() == experiment
+
+
+def test_limitations_are_those_of_this_run(result: Results, tmp_path: Path) -> None:
+    text = "\n".join(limitations(result))
+    assert "One seed: fewer than 5 are no sample" in text
+    assert "trunk is locked" in text
+    assert "robots fell" not in text
+    copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
+    path = copy.folder / "summary.csv"
+    table = pd.read_csv(path)
+    pd_upright = (table["metric"] == "upright") & (table["controller"] == "pd")
+    table.loc[pd_upright & (table["scenario"] == "payload"), "value"] = 0.0
+    path.write_text(table.to_csv(index=False))
+    assert "In payload under pd 2 robots fell (0, 0.4 m/s)" in "\n".join(limitations(copy))
+
+
+def test_a_report_that_cannot_be_written_is_reported(result: Results, tmp_path: Path) -> None:
+    copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
+    shutil.rmtree(copy.folder / "figures")
+    (copy.folder / "figures").write_text("in the way")
+    with pytest.raises(FileProblem, match="figures: cannot be written"):
+        write_report(copy)
+
+
+def test_an_unknown_suite_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["compare", "--suite", "everything"]) == 1
+    assert "unknown suite 'everything'; choose one of: default, mismatch" in capsys.readouterr().err
