@@ -1,16 +1,19 @@
-"""The command line: `pronk-pin compare | gaits | view | report | explain | parity`."""
+"""The command line: `pronk-pin compare | gaits | ilc | view | report | explain | parity`."""
 
 from __future__ import annotations
 
 import sys
+import warnings
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated, Any, Protocol, TextIO, Union
 
 import numpy as np
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, Positional, arg, subcommand
 
+from ._state import known_name
 from ._urdf import mujoco_spec
 from .compare import (
     Experiment,
@@ -21,9 +24,16 @@ from .compare import (
     mjcf_parity,
     run_experiment,
 )
+from .compare.changes import format_changes
 from .compare.closing import close_loop, format_loop
-from .compare.words import format_tables
-from .errors import InvalidInput, PronkError
+from .compare.gains import describe_gains, sweep_gains
+from .compare.prediction import compare_prediction, describe_prediction, practise
+from .compare.scenario import load_scenario
+from .compare.suites import SUITES, load_suite
+from .compare.transfer import describe_transfers, measure_transfers
+from .compare.words import families, format_suite, format_tables
+from .control import load_controller
+from .errors import InvalidInput, LeakyFilter, PronkError
 from .gait import (
     GaitLibrary,
     build_library,
@@ -39,6 +49,7 @@ from .robot import load_robot
 from .viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
 from .viz.explanation_figure import write_explanation_figure
 from .viz.gait_figures import write_gait_figures
+from .viz.learning_figures import write_prediction
 from .viz.practice import practice_programme
 from .viz.report import write_figures, write_report
 
@@ -52,6 +63,8 @@ class Compare:
 
     experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
     """What to compare."""
+    suite: str = "default"
+    """A named experiment, which the other options change: default, mismatch, control, paper."""
     folder: Path | None = None
     """Results folder; by default results/<time>-comparison."""
     workers: int | None = None
@@ -61,33 +74,39 @@ class Compare:
 
     def run(self) -> None:
         """Do it."""
-        folder = self.folder or default_folder()
+        name = "comparison" if self.suite == "default" else self.suite
+        folder = self.folder or default_folder(name)
         if self.experiment.world:
             print(mjcf_parity(load_robot(self.experiment.robot), self.experiment.world).table())
         results = run_experiment(
             self.experiment, folder, workers=self.workers, executor=self.executor
         )
-        print(f"robot {self.experiment.robot}, base {self.experiment.base}")
-        for scenario in self.experiment.scenarios:
-            print(f"\nscenario {scenario}\n")
-            print(format_tables(results.summary(), scenario=scenario))
+        print(f"robot {self.experiment.robot}, base {self.experiment.base}\n")
+        _print_tables(results)
         _write_pages(results)
 
 
 @dataclass(frozen=True)
 class Report:
-    """Write report.html and replay.html of a result again, and print its table."""
+    """Write the report and the replay of a result again, and print its tables.
+
+    With two results, say what is different in the second beyond noise.
+    """
 
     result: Positional[Path]
     """Results folder."""
+    other: Positional[Path | None] = None
+    """Results folder to compare it with."""
     figures: Path | None = None
     """Write the figures into this folder too, as SVG."""
 
     def run(self) -> None:
         """Do it."""
         results = Results.load(self.result)
-        for scenario in results.experiment.scenarios:
-            print(format_tables(results.summary(), scenario=scenario))
+        if self.other is not None:
+            print(format_changes(results, Results.load(self.other)))
+            return
+        _print_tables(results)
         _write_pages(results)
         if self.figures is not None:
             for path in write_figures(results, self.figures):
@@ -344,6 +363,114 @@ class Gaits:
 
 
 @dataclass(frozen=True)
+class Analyze:
+    """Say what a learning law will do along a gait, and lay what it did beside it.
+
+    Prints stability, transient growth, what is left of the error, and robustness, all from the
+    lifted model; then the predicted error of each stride beside the measured one.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller whose law of the stance is analysed."""
+    speed: tuple[float, ...] = (0.0,)
+    """Speeds [m/s]."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    result: Path | None = None
+    """Results folder with a practice; by default a short one is simulated."""
+    strides: int = 20
+    """Strides of learning to compare."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("analysis.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        if self.strides < 1:
+            raise InvalidInput(f"strides={self.strides}; give 1 or more")
+        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        if self.result is None:
+            made = practise(spec, self.speed, scenario, robot=self.robot, strides=self.strides)
+        else:
+            results = Results.load(self.result)
+            made = results.strides(results.find(controller=self.controller, scenario=self.scenario))
+        predictions = []
+        for speed in self.speed:
+            predictions.append(compare_prediction(spec, made, speed, scenario, number=self.strides))
+            print(describe_prediction(predictions[-1]), end="\n\n")
+        print(f"figure  {write_prediction(predictions, self.figure)}")
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Tell whether learning permits smaller feedback gains, as the paper claims.
+
+    Practises once, then replays what was learned with smaller gains, beside the same gains alone.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller that practises."""
+    speed: tuple[float, ...] = (-0.4, 0.0, 0.4, 0.8)
+    """Speeds [m/s]."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    robot: str = "a1"
+    """Robot."""
+
+    def run(self) -> None:
+        """Do it."""
+        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        print(describe_gains(sweep_gains(spec, self.speed, scenario, robot=self.robot)))
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Tell where a stored skill may be reused, and where it has to be practised again.
+
+    Learns at home, replays the torque library at home, at speeds that were left out, and in other
+    worlds, and compares with practice there.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller that practises."""
+    speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+    """Speeds [m/s], increasing."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    worlds: tuple[str, ...] = ("payload", "weak-motors", "soft-ground")
+    """Worlds in which the skill is tried."""
+    robot: str = "a1"
+    """Robot."""
+
+    def run(self) -> None:
+        """Do it."""
+        table = measure_transfers(
+            load_controller(self.controller),
+            self.speed,
+            load_scenario(self.scenario),
+            [load_scenario(name) for name in self.worlds],
+            robot=self.robot,
+        )
+        print(describe_transfers(table))
+
+
+@dataclass(frozen=True)
+class Ilc:
+    """Analyse learning laws, and what learning is good for."""
+
+    action: (
+        Annotated[Analyze, subcommand("analyze")]
+        | Annotated[Gains, subcommand("gains")]
+        | Annotated[Transfer, subcommand("transfer")]
+    )
+
+    def run(self) -> None:
+        """Do it."""
+        self.action.run()
+
+
+@dataclass(frozen=True)
 class Parity:
     """Tell whether an MJCF or a URDF is the same robot as ours; exit with 1 where it is not.
 
@@ -388,9 +515,21 @@ class _Runs(Protocol):
     def run(self) -> int | None: ...
 
 
+def _commands(arguments: list[str]) -> Any:
+    """All commands; the defaults of `compare` are those of the suite that is asked for."""
+    words = [word for argument in arguments for word in argument.split("=", 1)]
+    following = dict(pairwise(words))
+    suite = following.get("--suite", "default")
+    known_name("suite", suite, SUITES)
+    default = Compare(experiment=load_suite(suite), suite=suite)
+    return Union[  # noqa: UP007 -- its first member is made here
+        Annotated[Compare, subcommand("compare", default=default)], Command
+    ]
+
+
 Command = (
-    Annotated[Compare, subcommand("compare")]
-    | Annotated[Gaits, subcommand("gaits")]
+    Annotated[Gaits, subcommand("gaits")]
+    | Annotated[Ilc, subcommand("ilc")]
     | Annotated[View, subcommand("view")]
     | Annotated[Report, subcommand("report")]
     | Annotated[Explain, subcommand("explain")]
@@ -403,19 +542,43 @@ def main(arguments: list[str] | None = None) -> int:
     usage, 130 on Ctrl-C."""
     try:
         command: _Runs = tyro.cli(
-            Command,
+            _commands(sys.argv[1:] if arguments is None else arguments),
             prog="pronk-pin",
             description="When a legged robot repeats a motion, does practice beat the model?",
             args=arguments,
             config=(OmitSubcommandPrefixes,),
         )
-        return command.run() or 0
+        with warnings.catch_warnings():
+            warnings.simplefilter("once", LeakyFilter)
+            warnings.showwarning = _show_warning
+            return command.run() or 0
     except PronkError as error:
         print(f"pronk-pin: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("pronk-pin: interrupted", file=sys.stderr)
         return 130
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """A warning in one line, as errors are shown."""
+    print(f"pronk-pin: warning: {message}", file=sys.stderr)
+
+
+def _print_tables(results: Results) -> None:
+    """Table I, overview and verdict of one world; the overviews of many and one verdict."""
+    summary, worlds = results.summary(), families(results.experiment.scenarios)
+    if len(worlds) > 1:
+        print(format_suite(summary))
+    else:
+        print(format_tables(summary, scenario=worlds[0]))
 
 
 def _write_pages(results: Results) -> None:

@@ -202,6 +202,10 @@ class PortUnavailable(PronkError):
         )
 
 
+class LeakyFilter(UserWarning):
+    """A learning filter whose DC gain is not 1: it loses, or adds, torque in each stride."""
+
+
 class NoBrowser(PronkError):
     """There is no browser to draw pictures and films with, or it does not do it.
 

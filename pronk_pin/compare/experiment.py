@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from .._state import known_name
 from .._typing import Array
-from ..control import ControllerSpec, TorqueLibrary, load_controller, phase_grid
+from ..control import BASES, ControllerSpec, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
-from ..gait import SPEEDS, Gait, load_library
+from ..gait import SPEEDS, Gait, GaitLibrary, load_library
 from ..robot import Robot, load_robot
 from .explanation import explain, mended_gaits
 from .foreign import mjcf_spec
@@ -48,7 +49,7 @@ class Experiment:
         scenarios: Names of the worlds, composed with "+", values with "=": nominal, ideal,
             payload=2+slope, random-0-3; see `compare.scenario`.
         seeds: Seeds of the scatter at the start.
-        base: How the trunk moves: "locked" to x and z.
+        base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         world: MJCF of the robot, with the same joint names, that stands in for its URDF in the
             simulation; see `compare.foreign`. The scenarios add to what is in it: "ideal" takes it
             as it is.
@@ -66,7 +67,8 @@ class Experiment:
 
     def __post_init__(self) -> None:
         robot = load_robot(self.robot)
-        library = load_library(self.robot)
+        known_name("base", self.base, BASES)
+        library = _gaits(self.robot, self.base)
         names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
         object.__setattr__(self, "scenarios", names)
         for name in ("speeds", "controllers", "scenarios", "seeds"):
@@ -77,11 +79,13 @@ class Experiment:
         for speed in self.speeds:
             library.at(speed)
         for controller in self.controllers:
-            load_controller(controller)
+            if load_controller(controller).source == "identified" and self.base != "locked":
+                raise InvalidInput(
+                    f"controller '{controller}' identifies the robot on the locked base; leave it "
+                    "out, or use base 'locked'"
+                )
         if min(self.seeds) < 0:
             raise InvalidInput("seeds must not be negative")
-        if self.base != "locked":
-            raise InvalidInput(f"base '{self.base}' is not available; the base can be: locked")
         if self.world:
             mjcf_spec(robot, self.world)
             object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
@@ -157,7 +161,7 @@ def run_cell(
         The strides: see `compare.strides`.
     """
     robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.world)
-    library, spec = load_library(cell.robot), load_controller(cell.controller)
+    library, spec = _gaits(cell.robot, cell.base), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]
     mended = robot
     if spec.source == "identified":
@@ -172,10 +176,16 @@ def run_cell(
         scenario,
         schedule=cell.schedule,
         rng=rng,
-        feedforward=_feedforward(spec, mended, gaits, practised),
+        feedforward=_feedforward(spec, mended, gaits, practised, cell.base),
+        base=cell.base,
     )
     log = simulation.run(progress)
     return to_dataset(log, robot, gaits, attributes=_attributes(cell))
+
+
+def _gaits(robot: str, base: str) -> GaitLibrary:
+    """The gaits of a base: of a trunk that may turn those that let it pitch."""
+    return load_library(robot) if base == "locked" else load_library(robot, base="sagittal")
 
 
 def torque_library(strides: xr.Dataset) -> TorqueLibrary:
@@ -186,11 +196,15 @@ def torque_library(strides: xr.Dataset) -> TorqueLibrary:
 
 
 def _feedforward(
-    spec: ControllerSpec, robot: Robot, gaits: Sequence[Gait], practised: xr.Dataset | None
+    spec: ControllerSpec,
+    robot: Robot,
+    gaits: Sequence[Gait],
+    practised: xr.Dataset | None,
+    base: str,
 ) -> Array | None:
     """The feedforward that a controller begins with [N m], (n, 2, samples, 12)."""
     if spec.source in ("model", "identified"):
-        return model_feedforward(robot, gaits)
+        return model_feedforward(robot, gaits, base=base)
     if spec.source == "library":
         learned = torque_library(_learned(spec, practised))
         return learned.at(np.array([gait.speed for gait in gaits]))

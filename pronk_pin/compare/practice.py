@@ -18,6 +18,9 @@ RIVAL = "model"
 JUDGED = ("calf", "thigh")
 """Joints whose error counts."""
 
+VARIABLES = ("count", "peak_error", "learning", "upright")
+"""What of the strides `practice` reads."""
+
 WINDOW = 5
 """Strides whose mean error is compared, so that one lucky or unlucky stride decides nothing."""
 

@@ -18,7 +18,9 @@ from ..control import (
     clip_torque,
     phase_grid,
     resample,
+    roll_pitch_yaw,
 )
+from ..conventions import rotation_matrix
 from ..gait import Gait
 from ..robot import NL
 from .world import Motion
@@ -45,18 +47,22 @@ class TickLog:
         joints, joint_rates: Measured joint angles and velocities, shape (n, size, 12).
         feedback, feedforward, missing: Torques [N m], see `PhaseLog`, shape (n, size, 12).
         base, base_rate: Trunk x, z [m] and their rates [m/s], shape (n, size, 2).
+        balance: Torques that keep the trunk up, see `control.balance` [N m], shape (n, size, 12).
+        pose, twist: Trunk in Pinocchio's layout, shape (n, size, 7) and (n, size, 6).
         force: Ground's force on each foot, world frame [N], shape (n, size, 4, 3).
     """
 
-    _STATES = ("joints", "joint_rates", "base", "base_rate", "force")
-    _TORQUES = ("feedback", "feedforward", "missing")
+    _STATES = ("joints", "joint_rates", "base", "base_rate", "force", "pose", "twist")
+    _TORQUES = ("feedback", "feedforward", "missing", "balance")
 
     def __init__(self, n: int, size: int) -> None:
         self.size = size
         self.joints, self.joint_rates = np.zeros((2, n, size, NL))
-        self.feedback, self.feedforward, self.missing = np.zeros((3, n, size, NL))
+        self.feedback, self.feedforward, self.missing, self.balance = np.zeros((4, n, size, NL))
         self.base, self.base_rate = np.zeros((2, n, size, 2))
         self.force = np.zeros((n, size, NL // 3, 3))
+        self.pose, self.twist = np.zeros((n, size, 7)), np.zeros((n, size, 6))
+        self.pose[..., 6] = 1.0  # level, until something else is written
 
     def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
         """What robots did from a tick on."""
@@ -75,8 +81,9 @@ class TickLog:
             tape.velocity[:, ticks] - self.joint_rates[rows, ticks],
         )
         self.feedback[rows, ticks], self.feedforward[rows, ticks] = feedback, feedforward
-        given = clip_torque(feedback, feedforward, tau_max)
-        self.missing[rows, ticks] = given - feedback - feedforward
+        balance = self.balance[rows, ticks]
+        given = clip_torque(feedback + balance, feedforward, tau_max)
+        self.missing[rows, ticks] = given - feedback - feedforward - balance
 
     def take_torques(self, rows: IntArray, other: TickLog) -> None:
         """Take over what another log has of the torques."""
@@ -94,7 +101,9 @@ class TickLog:
             self.missing[rows, ticks],
             length,
             felt,
-            self.force[rows, ticks, :, 2].sum(axis=-1),
+            load=self.force[rows, ticks, :, 2].sum(axis=-1),
+            pose=self.pose[rows, ticks],
+            twist=self.twist[rows, ticks],
         )
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
@@ -117,9 +126,13 @@ class StrideLog:
         curves: The `error` [rad], `feedback` and `feedforward` [N m] of stance and flight, each of
             shape (n, strides, 2, samples, 12).
         base: Trunk x, z [m], shape (n, strides, 2, samples, 2).
+        attitude: Trunk roll, pitch, heading [rad], shape (n, strides, 2, samples, 3).
     """
 
-    SCALARS = ("start", "duration", "stance", "speed", "apex", "upright", "learning", "skipped")
+    SCALARS = (
+        *("start", "duration", "stance", "speed", "apex", "upright", "learning", "skipped"),
+        *("heading", "tilt"),
+    )
     CURVES = ("error", "feedback", "feedforward")
     TICKS: ClassVar = {
         "joints": (NL,),
@@ -147,6 +160,7 @@ class StrideLog:
         shape = (n, size, len(PARTS), SAMPLES)
         self.curves = {name: np.full((*shape, NL), np.nan, np.float32) for name in self.CURVES}
         self.base = np.full((*shape, 2), np.nan, np.float32)
+        self.attitude = np.full((*shape, 3), np.nan, np.float32)
         # Strides are kept in turn, and only near the end of the simulation.
         self._near = (LAST + 1) * LONGEST_PART * whole
         self._close = np.zeros(n, dtype=bool)
@@ -190,6 +204,8 @@ class StrideLog:
         index = self._grid * self._planned[part, rows, None] / self._timestep
         index = np.minimum(index, length[:, None] - 1.0)
         self.base[at] = resample(log.base[rows, : int(length.max())], index)
+        turned = roll_pitch_yaw(rotation_matrix(log.pose[rows, : int(length.max()), 3:]))
+        self.attitude[at] = resample(turned, index)
         close = self._close[rows]
         if close.any():
             self._keep_ticks(part, rows[close], log, length[close])
@@ -200,7 +216,7 @@ class StrideLog:
         beyond = np.arange(ticks) >= length[:, None]
         for name, store in self._ticks.items():
             if name == "torque":
-                parts = (log.feedback, log.feedforward, log.missing)
+                parts = (log.feedback, log.feedforward, log.balance, log.missing)
                 values = np.sum([channel[rows, :ticks] for channel in parts], axis=0)
             else:
                 values = getattr(log, name)[rows, :ticks].copy()
@@ -209,7 +225,15 @@ class StrideLog:
             store[(*kept, slice(ticks))] = values
 
     def end(
-        self, rows: IntArray, duration: Array, x: Array, upright: BoolArray, skipped: IntArray
+        self,
+        rows: IntArray,
+        duration: Array,
+        x: Array,
+        upright: BoolArray,
+        skipped: IntArray,
+        *,
+        tilt: Array | float = 0.0,
+        heading: Array | float = 0.0,
     ) -> None:
         """Strides have ended after so long (m,) [s], with the trunk at x (m,) [m].
 
@@ -219,12 +243,15 @@ class StrideLog:
             x: Where the trunk is [m].
             upright: Whether they have not fallen.
             skipped: Why nothing is learned from them, see `StrideSelection`.
+            tilt: Largest angle between trunk and gait [rad].
+            heading: Of the trunk at touchdown [rad].
         """
         at = (rows, self.count[rows])
         self.scalars["duration"][at] = duration
         self.scalars["speed"][at] = (x - self._begin_x[rows]) / duration
         self.scalars["upright"][at] = upright
         self.scalars["skipped"][at] = skipped
+        self.scalars["tilt"][at], self.scalars["heading"][at] = tilt, heading
         self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
 
     def finish(self, upright: BoolArray) -> None:

@@ -12,7 +12,17 @@ from typing import TypeAlias
 import numpy as np
 
 from .._typing import Array, IntArray
-from ..control import Controller, ControllerSpec, PhaseLog, Tape, clip_torque, phase_grid
+from ..control import (
+    Balance,
+    Controller,
+    ControllerSpec,
+    PhaseLog,
+    Tape,
+    clip_torque,
+    phase_grid,
+    roll_pitch_yaw,
+)
+from ..conventions import rotation_matrix
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..robot import Robot
@@ -37,6 +47,9 @@ _CHUNK = 20
 _FALLEN = 0.6
 """Trunk height, over that of the gait's lowest point, below which a robot has fallen."""
 
+
+_TUMBLED = np.cos(np.radians(45.0))
+"""Cosine of the angle between the trunk's axis and the vertical beyond which it has fallen."""
 
 _SHORTEST = 1.0
 """Shortest practice and learning [s]: even a robot that lies on the ground finishes a stride."""
@@ -91,6 +104,7 @@ class Simulation:
         schedule: What happens when.
         rng: Source of the scatter at the start.
         feedforward: Feedforward to begin with [N m], shape (n, 2, samples, 12).
+        base: How the trunks may move: "locked" to x and z, "sagittal" with pitch, or "free".
         chunked: Let servos play whole tapes, as MuJoCo can where the law is affine between two
             events; otherwise the feedback is computed tick by tick, as it always is where the
             scenario is not affine. The motion is the same.
@@ -107,21 +121,30 @@ class Simulation:
         schedule: Schedule,
         rng: np.random.Generator,
         feedforward: Array | None = None,
+        base: str = "locked",
         chunked: bool = True,
         threads: int = 0,
     ) -> None:
         n, dt = len(gaits), scenario.timestep
         self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
-        self.controller = Controller(robot, gaits, spec, timestep=dt, feedforward=feedforward)
+        self.controller = Controller(
+            robot, gaits, spec, timestep=dt, feedforward=feedforward, base=base
+        )
         self._gains, self._tau_max = spec.gains, robot.tau_max
-        self._chunked = chunked and scenario.affine
+        self._chunked = chunked and scenario.affine and base == "locked"
         servo = spec.gains if self._chunked else None
-        self.world = World(robot, scenario, n, servo=servo, threads=threads)
+        self.world = World(robot, scenario, n, base=base, servo=servo, threads=threads)
         self._motors = Motors(scenario, robot.tau_max, n)
         self._sensors = SensorSuite(scenario.sensors, n, rng.spawn(1)[0])
         self._log = TickLog(n, self.controller.max_ticks)
         # What the robots believe: the truth itself, where they compute nothing of their own.
         self._seen = self._log if self._chunked else TickLog(n, self.controller.max_ticks)
+        self._balance = None
+        if base != "locked":
+            ticks = self.controller.max_ticks
+            self._balance = Balance(
+                robot, gaits, spec.balance, gains=spec.gains, ticks=ticks, timestep=dt
+            )
         self._late = spec.touchdown_ticks
         self._load = spec.contact.touchdown * robot.mass * robot.gravity
         flight = np.array([gait.flight.duration for gait in gaits])
@@ -138,9 +161,10 @@ class Simulation:
         """Put the robots on the ground in the posture of their first stride."""
         start = np.array([0.0])
         joints = np.stack([gait.stance.joint_reference(start)[0][0] for gait in self._gaits])
-        height = [gait.stance.base_reference(start)[0][0, 1] for gait in self._gaits]
+        base = np.array([gait.stance.base_reference(start)[0][0] for gait in self._gaits])
         joints += self.schedule.scatter * rng.standard_normal(joints.shape)
-        self.world.reset(np.column_stack([np.zeros(len(joints)), height]), joints)
+        place = np.column_stack([np.zeros(len(joints)), base[:, 1]])
+        self.world.reset(place, joints, pitch=base[:, 2])
 
     def run(self, progress: Progress | None = None) -> StrideLog:
         """Simulate to the end of the schedule.
@@ -168,7 +192,7 @@ class Simulation:
         rows, late = np.arange(len(self._gaits)), self._late
         ticks = round(self.schedule.startup / self._dt) + late
         for piece in np.array_split(np.arange(ticks), -(-ticks // self._log.size)):
-            self._play(rows, self.controller.stand(len(piece)))
+            self._play(rows, self.controller.stand(len(piece)), part=None)
         self._rewind(rows, np.full(len(rows), len(piece) - late))
 
     def _stride(self, rows: IntArray, *, steps: int) -> None:
@@ -180,21 +204,35 @@ class Simulation:
         learning &= any(law is not None for law in controller.spec.laws)
         strides.begin(rows, self._seconds(start), learning, left=self._seconds(steps - start))
 
-        stance = self._play(rows, controller.touchdown(rows, learning))
+        stance = self._play(rows, controller.touchdown(rows, learning), part=0)
         tape, record = controller.liftoff(rows, self._measured(rows, stance, felt=late))
         if seen is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, felt=late))
         strides.stance(rows, record, log, stance)
+        tilt = self._tilt(0, rows, stance)
+        if self._balance is not None:
+            self._balance.lift_off(rows, controller.sideways(rows))
 
         # A touchdown is felt late: the last ticks of the flight's tape are the next stance's.
-        flight = self._play(rows, tape, airborne=True) - late
+        flight = self._play(rows, tape, part=1) - late
         duration, upright = self._seconds(stance + flight), self.upright[rows]
-        record = controller.landing(rows, self._measured(rows, flight), duration, upright)
+        tilt = np.maximum(tilt, self._tilt(1, rows, flight))
+        known = self._measured(rows, flight)
+        record = controller.landing(rows, known, duration, upright, tilt)
         if seen is not log:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)
         self._rewind(rows, flight)
-        strides.end(rows, duration, log.base[rows, 0, 0], upright, controller.skipped[rows])
+        heading = roll_pitch_yaw(rotation_matrix(log.pose[rows, 0, 3:]))[:, 2]
+        strides.end(
+            rows,
+            duration,
+            log.base[rows, 0, 0],
+            upright,
+            controller.skipped[rows],
+            tilt=tilt,
+            heading=heading,
+        )
         self._clock[rows] = start + stance + flight
 
     def _measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
@@ -219,16 +257,29 @@ class Simulation:
         for log in {id(log): log for log in (self._log, self._seen)}.values():
             log.rewind(rows, start, self._late)
 
+    def _tilt(self, part: int, rows: IntArray, length: IntArray) -> Array:
+        """Largest angle between trunk and gait in a part of the stride [rad], shape (m,)."""
+        if self._balance is None:
+            return np.zeros(len(rows))
+        pose = self._log.pose[rows, : int(length.max())]
+        return self._balance.tilt(part, rows, pose, length)
+
     def _seconds(self, ticks: IntArray) -> Array:
         return np.asarray(ticks * self._dt, dtype=float)
 
-    def _play(self, rows: IntArray, tape: Tape, *, airborne: bool = False) -> IntArray:
+    def _play(self, rows: IntArray, tape: Tape, *, part: int | None) -> IntArray:
         """Play tapes into the log until they end, or a flight's touchdown is felt.
+
+        Args:
+            rows: Whose.
+            tape: The tapes.
+            part: Part of the stride that they are, an index into `PARTS`; None for the start-up.
 
         Returns:
             How many ticks were played, shape (m,).
         """
         world, log, seen = self.world, self._log, self._seen
+        airborne = part == 1
         told = tape.setpoint(self._gains) if self._chunked else None
         played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
         while going.size:
@@ -236,7 +287,7 @@ class Simulation:
             if told is None:
                 stop = tick + 1
                 encoders = self._sensors.encoders(who, world.joints[who], world.joint_rates[who])
-                torque = self._torque(encoders, tape, going, tick)
+                torque = self._torque(who, encoders, tape, going, tick, part)
                 torque = self._motors.drive(who, torque, world.joint_rates[who])
                 motion = world.play(who, torque[:, None])
                 felt = self._felt(who, motion, encoders)
@@ -262,14 +313,32 @@ class Simulation:
         return expected if tick < expected else tick + _CHUNK
 
     def _torque(
-        self, encoders: tuple[Array, Array], tape: Tape, going: IntArray, tick: int
+        self,
+        rows: IntArray,
+        encoders: tuple[Array, Array],
+        tape: Tape,
+        going: IntArray,
+        tick: int,
+        part: int | None,
     ) -> Array:
-        """Torques of the feedback law at one tick, shape (m, 12)."""
+        """Torques of the feedback law at one tick, and of the balance, shape (m, 12)."""
         joints, rates = encoders
         feedback = self._gains.feedback(
             tape.position[going, tick] - joints, tape.velocity[going, tick] - rates
         )
+        if self._balance is not None:
+            balance = np.zeros_like(feedback)
+            if part is not None:
+                balance = self._balance.torque(
+                    part, rows, tick, self._believed(rows), joints, tape.position[going, tick]
+                )
+            self._seen.balance[rows, tick] = balance
+            feedback = feedback + balance
         return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
+
+    def _believed(self, rows: IntArray) -> tuple[Array, Array]:
+        """Pose (m, 7) and velocity (m, 6) of the trunk as the robots know them: the true ones."""
+        return self.world.pose[rows], self.world.twist[rows]
 
     def _felt(self, rows: IntArray, motion: Motion, encoders: tuple[Array, Array]) -> Motion:
         """One tick's motion as the robots know it."""
@@ -297,6 +366,8 @@ class Simulation:
         ended = over.any(axis=1)
         ends[ended] = count[np.argmax(over[ended], axis=1)]
         too_low = motion.base[..., 1] < self._floor[rows, None]
+        if self._balance is not None:
+            too_low |= rotation_matrix(motion.pose[..., 3:])[..., 2, 2] < _TUMBLED
         self.upright[rows] &= ~(too_low & (count <= ends[:, None])).any(axis=1)
         return ends
 

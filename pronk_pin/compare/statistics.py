@@ -82,6 +82,12 @@ def family(scenario: str) -> str:
     return _SAMPLED.sub(r"random-\1", scenario)
 
 
+def in_family(summary: pd.DataFrame, scenario: str) -> pd.DataFrame:
+    """The rows of a world, or of a family of sampled ones."""
+    worlds = [name for name in summary["scenario"].unique() if family(name) == scenario]
+    return summary[summary["scenario"].isin(worlds)]
+
+
 def robots(
     summary: pd.DataFrame,
     *,
@@ -102,9 +108,7 @@ def robots(
     Returns:
         Values, NaN where the robot fell (but for the metric `upright` itself).
     """
-    mine = summary[
-        (summary["scenario"].map(family) == scenario) & (summary["controller"] == controller)
-    ]
+    mine = in_family(summary[summary["controller"] == controller], scenario)
     values = _pivot(mine[(mine["metric"] == metric) & (mine["joint"] == joint)])
     if metric == "upright":
         return values
@@ -187,9 +191,7 @@ def _reduction(ours: Array, theirs: Array, axis: int = -1) -> Array:
 
 
 def _pivot(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.pivot_table(
-        index=["scenario", "seed"], columns="speed", values="value", dropna=False, observed=True
-    )
+    return rows.set_index(["scenario", "seed", "speed"])["value"].unstack("speed")
 
 
 def unit_of(values: pd.DataFrame) -> str:

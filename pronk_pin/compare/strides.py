@@ -26,6 +26,9 @@ _UNITS = {
     "upright": ("1", "1 as long as the robot has not fallen"),
     "learning": ("1", "1 where the stride was played with the learning law on"),
     "skipped": ("1", "why nothing was learned from the stride, 0 if nothing was wrong with it"),
+    "heading": ("rad", "heading of the trunk at the end of the stride"),
+    "tilt": ("rad", "largest angle between the trunk and the gait's"),
+    "attitude": ("rad", "roll, pitch and heading of the trunk"),
     "peak_error": ("rad", "peak of the stance error against the unmodified reference"),
     "rms_error": ("rad", "root mean square of the stance error"),
     "contact_error": ("rad", "peak of the stance error from the contact on, before it was felt"),
@@ -56,9 +59,10 @@ def to_dataset(
     """Label the strides of a simulation.
 
     Dimensions: `speed`, `stride` (from 0), `part` ("stance", "flight"), `phase` (t / T of the
-    reference, 0 to 1), `joint` (by name, in Pinocchio's order), `axis` (x, z). Unfinished strides
-    are cut off. Variables that begin with `tick_` hold the last strides at every tick (`tick`, of
-    `tick` times the attribute `timestep`; `foot`, `direction`), NaN after the end of a part; a
+    reference, 0 to 1), `joint` (by name, in Pinocchio's order), `axis` (x, z), `rotation` (roll,
+    pitch, heading). Unfinished strides are cut off. Variables that begin with `tick_` hold the last
+    strides at every tick (`tick`, of `tick` times the attribute `timestep`; `foot`, `direction`),
+    NaN after the end of a part; a
     state is that before the tick, a torque and a force act during it.
     """
     last = int(log.count.max(initial=0))
@@ -85,6 +89,7 @@ def to_dataset(
             "phase": ("phase", grid, {"units": "1"}),
             "joint": [name.removesuffix("_joint") for name in robot.joint_names],
             "axis": ["x", "z"],
+            "rotation": ["roll", "pitch", "heading"],
             "foot": list(robot.legs),
             "direction": ["x", "y", "z"],
         },
@@ -115,6 +120,7 @@ def _recorded(log: StrideLog) -> dict[str, _Variable]:
         "contact_error": (per_joint, log.contact_error),
         **{name: (curve, array) for name, array in log.curves.items()},
         "base": (path, log.base),
+        "attitude": ((*path[:-1], "rotation"), log.attitude),
     }
 
 

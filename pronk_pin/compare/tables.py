@@ -13,7 +13,15 @@ from ..robot import JOINTS
 from .metrics import reduction
 from .paper import table_1
 from .practice import RIVAL, beaten
-from .statistics import Interval, compare_controllers, family, mean_interval, robots, unit_of
+from .statistics import (
+    Interval,
+    compare_controllers,
+    family,
+    in_family,
+    mean_interval,
+    robots,
+    unit_of,
+)
 
 SHOWN = ("calf", "thigh")
 """Joints of the paper's Table I."""
@@ -78,7 +86,7 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
         summary: See `compare.metrics`.
         scenario: A world, or a family of sampled ones.
     """
-    mine = summary[summary["scenario"].map(family) == scenario]
+    mine = in_family(summary, scenario)
     names = [str(name) for name in mine["controller"].unique()]
     rows = {name: _row(mine, scenario, name, rivals=set(names) - {name}) for name in names}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("controller")
@@ -87,7 +95,7 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
 
 def answer(summary: pd.DataFrame) -> pd.DataFrame:
     """The overviews of all worlds, indexed by scenario and controller, in the summary's order."""
-    families = list(dict.fromkeys(summary["scenario"].map(family)))
+    families = list(dict.fromkeys(map(family, summary["scenario"].unique())))
     return pd.concat(
         {name: overview(summary, scenario=name) for name in families}, names=["scenario"]
     )
@@ -97,13 +105,15 @@ def _row(summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[s
     """A controller's row of `overview`."""
     mine: dict[str, Any] = {"scenario": scenario, "controller": controller}
 
+    own = summary[summary["controller"] == controller]
+
     def values(metric: str, joint: str = "-") -> Array:
-        found = robots(summary, **mine, metric=metric, joint=joint)
+        found = robots(own, **mine, metric=metric, joint=joint)
         return np.asarray(found.to_numpy(dtype=float)).ravel()
 
     row: dict[str, Any] = {}
     for joint in SHOWN:
-        row |= _interval(joint, mean_interval(robots(summary, **mine, joint=joint)))
+        row |= _interval(joint, mean_interval(robots(own, **mine, joint=joint)))
         row[f"{joint}_rms"] = _mean(values("rms_error", joint))
         if "pd" in rivals:
             found = compare_controllers(summary, **mine, against="pd", joint=joint)
@@ -117,13 +127,13 @@ def _row(summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[s
     row["strides"] = settled.max(skipna=False)
     row["beat_strides"], row["beat"], row["learners"] = beaten(summary, controller=controller)
     row["feedback"] = _mean(values("feedback_share"))
-    cost = robots(summary, **mine, metric="cost_of_transport", joint="-")
+    cost = robots(own, **mine, metric="cost_of_transport", joint="-")
     row["cost"] = _mean(cost.loc[:, np.abs(cost.columns.to_numpy(float)) > _MOVING].to_numpy(float))
     row["speed_error"] = _mean(np.abs(values("speed_error")))
     row["apex_error"] = _mean(np.abs(values("apex_error")))
     upright = values("upright")
     row["upright"], row["robots"] = int(np.nansum(upright)), int(np.isfinite(upright).sum())
-    row["unit"] = unit_of(robots(summary, **mine, metric="upright", joint="-"))
+    row["unit"] = unit_of(robots(own, **mine, metric="upright", joint="-"))
     return row
 
 
@@ -139,5 +149,5 @@ def _mean(values: Array) -> float:
 def worst_reduction(summary: pd.DataFrame, *, scenario: str, controller: str) -> dict[str, float]:
     """Smallest reduction of the peak error over the speeds, by joint; negative is worse than PD."""
     peaks = reduction(summary, "peak_error")
-    mine = peaks[(peaks["scenario"].map(family) == scenario) & (peaks["controller"] == controller)]
+    mine = in_family(peaks[peaks["controller"] == controller], scenario)
     return {joint: float(mine[mine["joint"] == joint]["value"].min()) for joint in JOINTS}

@@ -18,9 +18,15 @@ LEARNER = "ilc"
 _WIDTH = 100
 
 
-def verdict(summary: pd.DataFrame, *, scenario: str) -> str:
-    """The answer for one world in words; empty without `pd` and `ilc`."""
-    table = overview(summary, scenario=scenario)
+def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None = None) -> str:
+    """The answer for one world in words; empty without `pd` and `ilc`.
+
+    Args:
+        summary: See `compare.metrics`.
+        scenario: The world.
+        table: Its `overview`, if it is there already.
+    """
+    table = overview(summary, scenario=scenario) if table is None else table
     if not {"pd", LEARNER} <= set(table.index):
         return ""
     practice = table.loc[LEARNER]
@@ -80,9 +86,14 @@ def _control_arm(summary: pd.DataFrame) -> str:
     )
 
 
-def suite_verdict(summary: pd.DataFrame) -> str:
-    """The answer for all worlds in words; empty without `pd`, `ilc` and `model`."""
-    table = answer(summary)
+def suite_verdict(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -> str:
+    """The answer for all worlds in words; empty without `pd`, `ilc` and `model`.
+
+    Args:
+        summary: See `compare.metrics`.
+        table: Its `answer`, if it is there already.
+    """
+    table = answer(summary) if table is None else table
     controllers = set(table.index.get_level_values("controller"))
     if not {"pd", LEARNER, "model"} <= controllers:
         return ""
@@ -90,13 +101,13 @@ def suite_verdict(summary: pd.DataFrame) -> str:
     worlds = len(practice)
     sentences = [
         f"Does practice beat the model? In {_count(worlds, 'world')}, against the model's "
-        f"feedforward and beyond doubt ({CONFIDENCE:.0%} intervals of the paired difference):"
+        f"feedforward, by {CONFIDENCE:.0%} intervals of the paired difference:"
     ]
     for joint in SHOWN:
         better, worse, open_ = (
             list(practice.index[practice[f"{joint}_model"] == sign]) for sign in (1, -1, 0)
         )
-        parts = [f"in the {joint} it is better in {len(better)} of {worlds}"]
+        parts = [f"In the {joint} it is better in {len(better)} of {worlds}"]
         parts += [f"worse in {', '.join(worse)}"] if worse else []
         parts += [f"open in {', '.join(open_)}"] if open_ else []
         sentences.append("; ".join(parts) + ".")
@@ -132,7 +143,7 @@ def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
     parts = [
         _format_beside(beside_the_paper(summary, scenario=scenario)) if single else "",
         format_overview(table),
-        textwrap.fill(verdict(summary, scenario=scenario), _WIDTH),
+        textwrap.fill(verdict(summary, scenario=scenario, table=table), _WIDTH),
     ]
     return "\n\n".join(part for part in parts if part)
 
@@ -143,7 +154,7 @@ def format_suite(summary: pd.DataFrame) -> str:
     parts = []
     for scenario in dict.fromkeys(table.index.get_level_values("scenario")):
         parts.append(f"{scenario}\n{format_overview(table.loc[scenario])}")
-    return "\n\n".join([*parts, textwrap.fill(suite_verdict(summary), _WIDTH)])
+    return "\n\n".join([*parts, textwrap.fill(suite_verdict(summary, table=table), _WIDTH)])
 
 
 def _format_beside(table: pd.DataFrame) -> str:

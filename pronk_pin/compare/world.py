@@ -15,29 +15,31 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
+from .._state import known_name
 from .._typing import Array, BoolArray, IntArray
 from .._urdf import mujoco_spec
-from ..control import Gains
+from ..control import BASES, Gains
 from ..robot import Robot
 from .foreign import mjcf_spec
 from .ground import add_ground, name_feet
 from .motors import push_force
 from .scenario import Scenario
 from .trunk import load_trunk
+from .trunk_state import Trunk
 
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _CONTROL, _PUSHED = mujoco.mjtState.mjSTATE_CTRL, mujoco.mjtState.mjSTATE_XFRC_APPLIED
 
 
 def build_model(
-    robot: Robot, scenario: Scenario, *, free: bool = False, servo: Gains | None = None
+    robot: Robot, scenario: Scenario, *, base: str = "locked", servo: Gains | None = None
 ) -> mujoco.MjModel:
     """Compile the robot in its world.
 
     Args:
         robot: The robot, whose URDF is used if the scenario names no MJCF.
         scenario: What the world adds to that.
-        free: Leave the trunk its six degrees of freedom instead of x and z only.
+        base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         servo: Gains of servos at the joints, see `World`; without them torque motors.
     """
     spec = mjcf_spec(robot, scenario.mjcf) if scenario.mjcf else mujoco_spec(robot)
@@ -53,11 +55,13 @@ def build_model(
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
 
     trunk = spec.body(robot.spec.base_link)
-    if not free:
+    if known_name("base", base, BASES) != "free":
         for joint in trunk.joints:
             spec.delete(joint)
         for name, axis in (("x", [1, 0, 0]), ("z", [0, 0, 1])):
             trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        if base == "sagittal":
+            trunk.add_joint(name="pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
     load_trunk(trunk, scenario)
     _add_motors(spec, robot, scenario, servo)
     name_feet(spec, robot)
@@ -114,6 +118,10 @@ class Motion(NamedTuple):
     """Ground's force on each foot, world frame [N], shape (m, ticks, 4, 3)."""
     path: Array
     """MuJoCo's full physics states, and the one after the last tick, (m, ticks + 1, nstate)."""
+    pose: Array
+    """Trunk's position and quaternion xyzw, shape (m, ticks, 7)."""
+    twist: Array
+    """Trunk's linear and angular velocity in its own axes [m/s, rad/s], shape (m, ticks, 6)."""
 
 
 class World:
@@ -123,6 +131,7 @@ class World:
         robot: The robot.
         scenario: The world.
         n: Number of robots.
+        base: How the trunks may move, see `build_model`.
         servo: Gains of servos at the joints, which are then told set points (see
             `Tape.setpoint`) and keep to the motors' limits themselves; without them the motors
             are told torques.
@@ -143,11 +152,12 @@ class World:
         scenario: Scenario,
         n: int,
         *,
+        base: str = "locked",
         servo: Gains | None = None,
         threads: int = 0,
     ) -> None:
         self.robot, self.scenario, self.n = robot, scenario, n
-        self.model = build_model(robot, scenario, servo=servo)
+        self.model = build_model(robot, scenario, base=base, servo=servo)
         # rollout without checks wants one model a robot, and one data a thread.
         self._models = [self.model] * n
         self._data = [mujoco.MjData(self.model) for _ in range(max(threads, 1))]
@@ -157,8 +167,8 @@ class World:
         self._qpos = np.array([1 + model.joint(name).qposadr[0] for name in robot.joint_names])
         self._qvel = np.array([1 + nq + model.joint(name).dofadr[0] for name in robot.joint_names])
         self._ctrl = np.array([model.actuator(name).id for name in robot.joint_names])
-        self._base = np.array([1 + model.joint(name).qposadr[0] for name in ("x", "z")])
-        self._base_rate = np.array([1 + nq + model.joint(name).dofadr[0] for name in ("x", "z")])
+        self._trunk = Trunk(model, robot)
+        self._base, self._base_rate = self._trunk.x_z, self._trunk.x_z_rate
         address = [model.sensor(name).adr[0] for name in robot.foot_names]
         self._force = np.array(address)[:, None] + np.arange(3)
         # Forces on the bodies come after the motors' controls: force and moment, in the world.
@@ -176,6 +186,8 @@ class World:
         joints: Array,
         base_rate: Array | float = 0.0,
         joint_rates: Array | float = 0.0,
+        *,
+        pitch: Array | float = 0.0,
     ) -> None:
         """Put every robot somewhere, by default at rest.
 
@@ -184,9 +196,11 @@ class World:
             joints: Joint angles [rad], shape (n, 12).
             base_rate: Rates of the trunk's x and z [m/s], shape (n, 2).
             joint_rates: Joint velocities [rad/s], shape (n, 12).
+            pitch: Of the trunk, where it may turn [rad], shape (n,).
         """
         state = self._state
         state[:] = 0.0
+        self._trunk.put(state, pitch)
         state[:, self._base], state[:, self._qpos] = base, joints
         state[:, self._base_rate], state[:, self._qvel] = base_rate, joint_rates
         self._warmstart[:], self.force[:] = 0.0, 0.0
@@ -228,6 +242,8 @@ class World:
             # The sensors are of the state before each step, and have the floor's side of it.
             force=-sensors[..., self._force],
             path=path,
+            pose=self._trunk.pose(before),
+            twist=self._trunk.twist(before),
         )
 
     def advance(self, rows: IntArray, motion: Motion, ticks: IntArray) -> None:
@@ -252,6 +268,16 @@ class World:
         return self._state[:, self._base]
 
     @property
+    def pose(self) -> Array:
+        """Trunk's position and quaternion xyzw, shape (n, 7)."""
+        return self._trunk.pose(self._state)
+
+    @property
+    def twist(self) -> Array:
+        """Trunk's linear and angular velocity in its own axes [m/s, rad/s], shape (n, 6)."""
+        return self._trunk.twist(self._state)
+
+    @property
     def base_rate(self) -> Array:
         """See the class."""
         return self._state[:, self._base_rate]
@@ -274,6 +300,7 @@ class World:
     def restart(self, rows: IntArray) -> None:
         """Put robots that left the finite numbers back to rest, so that the others go on."""
         self._state[rows] = 0.0
+        self._trunk.put(self._state, 0.0, rows)
         self._state[rows[:, None], self._qpos] = self.robot.standing[7:]
         self._state[rows, self._base[1]] = self.robot.standing[2]
         self._warmstart[rows] = 0.0

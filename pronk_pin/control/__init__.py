@@ -1,36 +1,43 @@
 """What the robot is told to do: feedback, feedforward and learning, one tape a phase."""
 
+from .attitude import AttitudeRegulator, attitude_angle, attitude_error, roll_pitch_yaw
+from .balance import Balance, BalanceSpec
 from .contacts import ContactDetector, StanceContact
 from .controller import CONTROLLERS, Controller, ControllerSpec, load_controller
+from .feedforward import BASES, model_feedforward
 from .filters import ZeroPhaseFilter
 from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
-    ModelBasedILC,
-    NormOptimalILC,
     PaperILC,
     PDTypeILC,
-    PlantInversionILC,
     StrideSelection,
     anti_windup,
 )
 from .lifted import LiftedModel
 from .linearise import Settings, lifted_model
+from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
+from .placement import FootPlacement
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape, clip_torque
 from .torque_library import TorqueLibrary
 
 __all__ = [
+    "BASES",
     "CONTROLLERS",
     "PARTS",
     "SAMPLES",
     "SKIPPED",
+    "AttitudeRegulator",
+    "Balance",
+    "BalanceSpec",
     "ContactDetector",
     "Controller",
     "ControllerSpec",
     "CurrentIterationILC",
+    "FootPlacement",
     "Gains",
     "LearningLaw",
     "LegAngleRegulator",
@@ -49,9 +56,13 @@ __all__ = [
     "TorqueLibrary",
     "ZeroPhaseFilter",
     "anti_windup",
+    "attitude_angle",
+    "attitude_error",
     "clip_torque",
     "lifted_model",
     "load_controller",
+    "model_feedforward",
     "phase_grid",
     "resample",
+    "roll_pitch_yaw",
 ]

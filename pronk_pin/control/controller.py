@@ -17,14 +17,15 @@ from ..errors import InvalidInput
 from ..gait import Gait, GaitPhase
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
+from .balance import BalanceSpec
 from .contacts import ContactDetector
 from .estimation import SpeedEstimator
+from .feedforward import BASES
 from .filters import ZeroPhaseFilter
 from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
-    ModelBasedILC,
     PaperILC,
     PDTypeILC,
     StrideSelection,
@@ -32,8 +33,10 @@ from .learning import (
     given,
 )
 from .linearise import Settings, lifted_model
+from .model_based import ModelBasedILC, NormOptimalILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
 from .regulation import LegAngleRegulator
+from .symmetry import symmetric
 from .tape import Gains, Tape
 
 SOURCES = ("none", "model", "library", "identified")
@@ -56,6 +59,7 @@ class ControllerSpec:
         flight_law: Learning law of the flight, likewise.
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
+        balance: Attitude and foot placement where the trunk is free to turn.
         selection: Strides worth learning from.
         contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
@@ -71,6 +75,7 @@ class ControllerSpec:
     flight_law: LearningLaw | None = None
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
+    balance: BalanceSpec = field(default_factory=BalanceSpec)
     selection: StrideSelection = field(default_factory=StrideSelection)
     contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
@@ -113,6 +118,7 @@ CONTROLLERS = {
         ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
         ControllerSpec("ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True),
+        ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }
 """Controllers known by name; the first five make the default comparison."""
@@ -179,8 +185,10 @@ class Controller:
         *,
         timestep: float,
         feedforward: Array | None = None,
+        base: str = "locked",
     ) -> None:
         n = len(gaits)
+        known_name("base", base, BASES)
         shape = (n, len(PARTS), SAMPLES, NL)
         if feedforward is None:
             feedforward = np.zeros(shape)
@@ -199,6 +207,16 @@ class Controller:
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
         self._laws = list(spec.laws)
+        self._base = base
+        for law in self._laws:
+            learning_filter = getattr(law, "filter", None)
+            if isinstance(learning_filter, ZeroPhaseFilter):
+                learning_filter.warn()
+        if base != "locked" and (spec.imu or isinstance(spec.law, ModelBasedILC)):
+            raise InvalidInput(
+                f"controller '{spec.name}' has an IMU or a law with a model that count on a level "
+                "trunk; use another controller, or base 'locked'"
+            )
         if isinstance(spec.law, ModelBasedILC):
             settings = Settings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
@@ -212,6 +230,10 @@ class Controller:
         self._lift_off_speed = np.array(
             [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
         )
+
+    def sideways(self, rows: IntArray) -> Array:
+        """Speeds to the left with which robots left the ground [m/s], shape (m,)."""
+        return self._estimator.sideways[rows]
 
     @property
     def max_ticks(self) -> int:
@@ -260,7 +282,12 @@ class Controller:
         return tape, record
 
     def landing(
-        self, rows: IntArray, log: PhaseLog, duration: Array, upright: BoolArray | None = None
+        self,
+        rows: IntArray,
+        log: PhaseLog,
+        duration: Array,
+        upright: BoolArray | None = None,
+        tilt: Array | None = None,
     ) -> StrideRecord:
         """The end of a stride: the flight's record; whether the stride is worth learning from.
 
@@ -269,6 +296,7 @@ class Controller:
             log: What was measured in flight.
             duration: How long their strides lasted [s], shape (len(rows),).
             upright: Whether they have not fallen, shape (len(rows),); all by default.
+            tilt: Largest angle between trunk and gait [rad], shape (len(rows),); 0 by default.
         """
         record = self.record(1, rows, log)
         self._last[1].put(rows, record)
@@ -279,6 +307,9 @@ class Controller:
             last.upright[rows] = True if upright is None else upright
             reasons.append(self.spec.selection.skipped(last.take(rows)))
         reasons.append(self._stood[rows])
+        if tilt is not None:
+            far = tilt > self.spec.selection.tilt
+            reasons.append(np.where(far, SKIPPED.index("tilted"), 0))
         self.skipped[rows] = np.select([reason > 0 for reason in reasons], reasons, default=0)
         return record
 
@@ -325,5 +356,8 @@ class Controller:
             for part, law in enumerate(self._laws):
                 if law is not None:
                     record = self._last[part].take(rows)
-                    learned = law.update(given(record))
+                    told = given(record)
+                    if self._base == "free":
+                        told = symmetric(self.robot, told)
+                    learned = law.update(told)
                     self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)

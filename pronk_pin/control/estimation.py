@@ -24,13 +24,14 @@ class SpeedEstimator:
 
     Attributes:
         speed: The estimates [m/s], shape (n,).
+        sideways: Those of the speed to the left, in the world [m/s], shape (n,).
     """
 
     def __init__(self, robot: Robot, n: int, *, time_constant: float, timestep: float) -> None:
         if time_constant < 0.0:
             raise InvalidInput("the time constant of the speed filter must not be negative")
         self._robot, self._time_constant, self._timestep = robot, time_constant, timestep
-        self.speed = np.zeros(n)
+        self.speed, self.sideways = np.zeros((2, n))
 
     def update(self, rows: IntArray, log: PhaseLog) -> Array:
         """Take in a stance that some robots have just finished; their new estimates [m/s].
@@ -42,16 +43,19 @@ class SpeedEstimator:
         """
         n, ticks = len(rows), int(log.length.max())
         used = np.arange(ticks) < log.length[:, None]
-        sound = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1) | ~used
+        pose, twist = _trunk(log, n, ticks)
+        sound = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1)
+        known = np.isfinite(pose.sum(axis=-1) + twist.sum(axis=-1)) & used
+        pose[~known], twist[~known] = _LEVEL, 0.0
+        sound = (sound & known) | ~used
         if not sound.all():
             log = replace(
                 log,
                 joints=np.nan_to_num(log.joints, posinf=0.0, neginf=0.0),
                 joint_rates=np.nan_to_num(log.joint_rates, posinf=0.0, neginf=0.0),
             )
-        # The base is level: locked here, and an attitude estimate's business elsewhere.
-        q = self._robot.q_from_base(np.zeros((n, ticks, 3)), log.joints[:, :ticks])
-        v = np.concatenate([np.zeros((n, ticks, 6)), log.joint_rates[:, :ticks]], axis=-1)
+        q = np.concatenate([pose, log.joints[:, :ticks]], axis=-1)
+        v = np.concatenate([twist, log.joint_rates[:, :ticks]], axis=-1)
         velocity = leg_odometry(
             self._robot, q.reshape(n * ticks, -1), v.reshape(n * ticks, -1), contact="rolling"
         )
@@ -60,12 +64,24 @@ class SpeedEstimator:
             forward = forward + self._time_constant * log.specific_force[:, :ticks, 0]
             sound &= np.isfinite(forward) | ~used
             forward = np.where(used, forward, 0.0)
-        filtered = first_order(
-            forward,
-            self.speed[rows],
-            time_constant=self._time_constant,
-            timestep=self._timestep,
-        )
-        latest = filtered[np.arange(n), log.length - 1]
-        self.speed[rows] = np.where(sound.all(axis=1), latest, self.speed[rows])
+        aside = velocity[:, 1].reshape(n, ticks)
+        for measured, speeds in ((forward, self.speed), (aside, self.sideways)):
+            filtered = first_order(
+                measured,
+                speeds[rows],
+                time_constant=self._time_constant,
+                timestep=self._timestep,
+            )
+            latest = filtered[np.arange(n), log.length - 1]
+            speeds[rows] = np.where(sound.all(axis=1), latest, speeds[rows])
         return self.speed[rows]
+
+
+_LEVEL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+
+
+def _trunk(log: PhaseLog, n: int, ticks: int) -> tuple[Array, Array]:
+    """Trunk's pose (n, ticks, 7) and velocity (n, ticks, 6): level where nothing else is known."""
+    if log.pose is not None and log.twist is not None:
+        return log.pose[:, :ticks].copy(), log.twist[:, :ticks].copy()
+    return np.tile(_LEVEL, (n, ticks, 1)), np.zeros((n, ticks, 6))

@@ -6,20 +6,40 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .._state import known_name
 from .._typing import Array
 from ..gait import Gait
 from ..inverse_dynamics import SAGITTAL_GUIDE, feedforward
 from ..robot import Robot
 from .record import SAMPLES
 
+GUIDES: dict[str, tuple[str, ...] | None] = {
+    "locked": SAGITTAL_GUIDE,
+    "sagittal": ("y", "roll", "yaw"),
+    "free": None,
+}
+"""What a guide holds of the trunk, by how it may move: x and z only, pitch too, or anyhow."""
+
+BASES = tuple(GUIDES)
+"""How a trunk may move."""
+
 
 def model_feedforward(
-    robot: Robot, gaits: Sequence[Gait], *, samples: int = SAMPLES, friction: float = 0.6
+    robot: Robot,
+    gaits: Sequence[Gait],
+    *,
+    samples: int = SAMPLES,
+    friction: float = 0.6,
+    base: str = "locked",
 ) -> Array:
     """Torques that the model asks for in stance and flight of each gait [N m].
 
-    Shape (n, 2, samples, 12).
+    Shape (n, 2, samples, 12). Where the base is free, the legs hold what a guide would.
+
+    Raises:
+        UnknownName: There is no such base; see `BASES`.
     """
+    guide = GUIDES[known_name("base", base, BASES)]
     found = [
         feedforward(
             robot,
@@ -27,7 +47,7 @@ def model_feedforward(
             samples=samples,
             friction=friction,
             contact="rolling",
-            guide=SAGITTAL_GUIDE,
+            guide=guide,
         )
         for gait in gaits
     ]

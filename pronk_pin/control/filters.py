@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import signal
 
 from .._typing import Array
-from ..errors import InvalidInput
+from ..errors import InvalidInput, LeakyFilter
 from .record import resample
 
 PAPER_B = (0.003, 0.009, 0.009, 0.003)
 PAPER_A = (1.00, -2.37, 1.93, -0.53)
 """The coefficients printed in section III of the paper. They are `butter(3, 0.1)` rounded, and the
 rounding makes the DC gain 0.8 a pass: 36 % of the torque is lost in each stride."""
+
+_LEAK = 1e-3
+"""How far the DC gain may be from 1 without a warning."""
 
 
 @dataclass(frozen=True)
@@ -33,9 +37,30 @@ class ZeroPhaseFilter:
         if np.max(np.abs(np.roots(self.a)), initial=0.0) >= 1.0:
             raise InvalidInput("the filter is unstable; its poles must lie inside the unit circle")
 
+    def warn(self) -> None:
+        """Warn with `LeakyFilter` if the DC gain is not 1."""
+        if abs(self.dc_gain - 1.0) > _LEAK:
+            change = "loses" if self.dc_gain < 1.0 else "adds"
+            warnings.warn(
+                f"the learning filter has a DC gain of {self.dc_gain:.3g} forward and backward and "
+                f"{change} {abs(1.0 - self.dc_gain):.0%} of a constant torque in each stride; use "
+                "coefficients that are not rounded, as ZeroPhaseFilter.butterworth gives them",
+                LeakyFilter,
+                stacklevel=3,
+            )
+
     @classmethod
     def butterworth(cls, order: int, cutoff: float) -> ZeroPhaseFilter:
-        """A Butterworth low-pass with its cut-off as a fraction of the Nyquist frequency."""
+        """A Butterworth low-pass with its cut-off as a fraction of the Nyquist frequency.
+
+        Raises:
+            InvalidInput: The order is below 1, or the cut-off not between 0 and 1.
+        """
+        if order < 1 or not 0.0 < cutoff < 1.0:
+            raise InvalidInput(
+                f"a Butterworth filter of order {order} and cut-off {cutoff:g}; give an order of 1 "
+                "or more and a cut-off between 0 and 1, the Nyquist frequency"
+            )
         b, a = signal.butter(order, cutoff)
         return cls(tuple(b.tolist()), tuple(a.tolist()))
 

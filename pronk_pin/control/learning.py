@@ -5,16 +5,14 @@ A law is a function with parameters and no state: what was learned so far is in 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, look_ahead
-from .lifted import LiftedModel
 from .record import StrideRecord
 from .tape import Gains
 
@@ -29,7 +27,7 @@ class LearningLaw(Protocol):
 
 SKIPPED = (
     *("", "not finite", "fallen", "too short", "too long", "duration unknown"),
-    *("false touchdown", "contact lost"),
+    *("false touchdown", "contact lost", "tilted"),
 )
 """Why nothing is learned from a stride; the first where nothing is wrong with it."""
 
@@ -41,10 +39,13 @@ class StrideSelection:
     Attributes:
         shortest: Shortest stride, over the reference's duration.
         longest: Longest one.
+        tilt: Largest angle between trunk and gait [rad]: where a trunk that is free to turn is
+            further off, its attitude comes first.
     """
 
     shortest: float = 0.7
     longest: float = 1.4
+    tilt: float = 0.15
 
     def skipped(self, record: StrideRecord) -> IntArray:
         """Why the robots' strides are not, as an index into `SKIPPED`, shape (n,)."""
@@ -189,130 +190,6 @@ class CurrentIterationILC:
         """See `LearningLaw.update`."""
         feedback = look_ahead(record.feedback, self.delta)
         return self.filter((1.0 - self.leak) * record.feedforward + self.gain * feedback)
-
-
-class Directions(NamedTuple):
-    """The directions in which a feedforward moves the errors: a thin SVD of the lifted model."""
-
-    errors: Array
-    """What each does to the errors, orthonormal columns, shape (size, rank)."""
-    gains: Array
-    """How much, decreasing [rad/(N m)], shape (rank,)."""
-    torques: Array
-    """The feedforwards that do it, orthonormal columns, shape (size, rank)."""
-
-    @classmethod
-    def of(cls, model: LiftedModel, *, rank: int = 120) -> Directions:
-        """The strongest directions of a model; a few of 161 x 12, since the rest hardly move it.
-
-        Randomised SVD (Halko, Martinsson and Tropp 2011) with two power iterations.
-        """
-        matrix = model.angle
-        if len(matrix) <= 2 * rank:
-            left, gains, right = np.linalg.svd(matrix)
-        else:
-            rng = np.random.default_rng(0)
-            basis = matrix @ rng.standard_normal((len(matrix), rank))
-            for _ in range(2):
-                basis = matrix @ (matrix.T @ np.linalg.qr(basis)[0])
-            basis = np.linalg.qr(basis)[0]
-            left, gains, right = np.linalg.svd(basis.T @ matrix, full_matrices=False)
-            left = basis @ left
-        return cls(left, gains, right.T)
-
-
-@dataclass(frozen=True)
-class ModelBasedILC:
-    """A law that needs the lifted model of each robot's gait; `along` gives it.
-
-    Attributes:
-        directions: The models' directions, one for each robot; empty until `along`.
-    """
-
-    directions: tuple[Directions, ...] = field(default=(), repr=False, compare=False, kw_only=True)
-
-    def along(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
-        """The law for robots of these models, in the order of `StrideRecord.robot`."""
-        return replace(self, directions=tuple(Directions.of(model) for model in models))
-
-    def update(self, record: StrideRecord) -> Array:
-        """See `LearningLaw.update`."""
-        learned = np.empty_like(record.feedforward)
-        for row, robot in enumerate(record.robot):
-            if robot >= len(self.directions):
-                raise InvalidInput(
-                    f"{type(self).__name__} knows the models of {len(self.directions)} robots and "
-                    f"is asked for robot {robot}; give it theirs by `along(models)`"
-                )
-            error, ff = record.error[row].reshape(-1), record.feedforward[row].reshape(-1)
-            learned[row] = self._next(self.directions[robot], error, ff).reshape(learned[row].shape)
-        return learned
-
-    def _next(self, along: Directions, error: Array, feedforward: Array) -> Array:
-        raise NotImplementedError
-
-
-@dataclass(frozen=True)
-class PlantInversionILC(ModelBasedILC):
-    """Plant inversion: the feedforward that would have undone the error, by the model.
-
-    `ff <- (1 - leak) ff + gain G^+ e`, with the inverse cut off where the model hardly answers.
-
-    Attributes:
-        gain: Learning gain; 0 to 1. 1 converges in one stride where the model is right.
-        cutoff: Weakest direction that is inverted, over the strongest.
-        leak: Part of the memory that is forgotten in each stride.
-    """
-
-    gain: float = 0.5
-    cutoff: float = 0.03
-    leak: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not (0.0 <= self.gain < 2.0 and 0.0 < self.cutoff < 1.0 and 0.0 <= self.leak <= 1.0):
-            raise InvalidInput(
-                "plant inversion needs gain in [0, 2), cutoff in (0, 1) and leak in [0, 1]; "
-                f"got {self.gain:g}, {self.cutoff:g}, {self.leak:g}"
-            )
-
-    def _next(self, along: Directions, error: Array, feedforward: Array) -> Array:
-        kept = along.gains > self.cutoff * along.gains[0]
-        amount = (along.errors[:, kept].T @ error) / along.gains[kept]
-        change = along.torques[:, kept] @ amount
-        return np.asarray((1.0 - self.leak) * feedforward + self.gain * change)
-
-
-@dataclass(frozen=True)
-class NormOptimalILC(ModelBasedILC):
-    """Norm-optimal law: the least sum of squares of error, change and feedforward, by the model.
-
-    The next feedforward minimises `|e|^2 + change |ff - ff_last|^2 + effort |ff|^2` for the
-    predicted error e of the next stride (Gunnarsson and Norrlof 2001).
-
-    Attributes:
-        change: Weight of the change of the feedforward [rad^2/(N m)^2]: slower, but more robust.
-        effort: Weight of the feedforward itself [rad^2/(N m)^2]: what does not help is forgotten.
-    """
-
-    change: float = 3e-4
-    effort: float = 1e-7
-
-    def __post_init__(self) -> None:
-        if not (self.change >= 0.0 and self.effort >= 0.0 and self.change + self.effort > 0.0):
-            raise InvalidInput(
-                "a norm-optimal law needs weights that are not negative, and one that is positive; "
-                f"got change={self.change:g}, effort={self.effort:g}"
-            )
-
-    def _next(self, along: Directions, error: Array, feedforward: Array) -> Array:
-        weight = self.change + self.effort
-        memory = along.torques.T @ feedforward
-        amount = along.gains * (along.errors.T @ error) - self.effort * memory
-        amount = amount / (along.gains**2 + weight)
-        # Along the other directions only the effort counts.
-        rest = feedforward - along.torques @ memory
-        change = along.torques @ amount - self.effort / weight * rest
-        return np.asarray(feedforward + change)
 
 
 def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:

@@ -45,7 +45,7 @@ class Settings(NamedTuple):
 
     `share` is the part of the gait's torque that acts as feedforward on the orbit: 0 before
     learning, and about 1 after it. How long the feet stay on the ground past the planned
-    lift-off changes in between, and with it the answers; 0.3 predicts whole learnings best.
+    lift-off changes in between, and with it the answers; 0.6 predicts whole learnings best.
     """
 
     gains: Gains = Gains()
@@ -53,7 +53,7 @@ class Settings(NamedTuple):
     speed_filter: float = 0.02
     touchdown_ticks: int = 2
     timestep: float = 0.001
-    share: float = 0.3
+    share: float = 0.6
 
 
 class _Phase(NamedTuple):
@@ -125,7 +125,7 @@ class _Strides:
                 resample(values[None, : self.ticks], measured)[0].reshape(SAMPLES * NL, -1)
             )
 
-        onward = self.touchdown(landing) @ self.flown(flight)
+        onward = self.touchdown(landing, len(flight.torques)) @ self.flown(flight)
         joints, rates = slice(2, _FREE), slice(_FREE + 2, _SPEED)
         return LiftedModel(
             angle=on_grid(pushed[:, joints]),
@@ -260,7 +260,7 @@ class _Strides:
         end[:, _SPEED] += self.settings.regulator.gain * pushed[-1, :, 0]
         return np.asarray(end)
 
-    def touchdown(self, landing: Array) -> Array:
+    def touchdown(self, landing: Array, tick: int) -> Array:
         """The state at which stance begins by that at the last tick of flight, (29, 29)."""
         step = _STEP * np.eye(_STATES)[: _FREE + _FREE]
         q = self.q(landing)
@@ -268,7 +268,6 @@ class _Strides:
             [(self.height(self.q(landing + d)) - self.height(self.q(landing - d))) for d in step]
         ) / (2.0 * _STEP)
         # Where the feet are higher by dh, touchdown is later by dh / (speed of their coming down).
-        tick = min(round(self.gait.flight.duration / self.settings.timestep), len(self.flight) - 1)
         a, _ = guided_acceleration(
             self.robot,
             q,

@@ -30,6 +30,9 @@ class PhaseLog:
         length: Ticks that the phase lasted; later ones hold nothing of it, shape (n,).
         felt: Tick at which its beginning was felt: those before were played on the tape before.
         load: Vertical force on all feet [N], shape (n, ticks); None where nothing feels it.
+        pose: Trunk's position and quaternion as the robots believe them, shape (n, ticks, 7); None
+            where the trunk is level.
+        twist: Trunk's velocity in its own axes, likewise, shape (n, ticks, 6).
         specific_force: What the accelerometer says, in the trunk's frame [m/s^2], shape
             (n, ticks, 3); None without an IMU.
     """
@@ -42,6 +45,8 @@ class PhaseLog:
     length: IntArray
     felt: int = 0
     load: Array | None = None
+    pose: Array | None = None
+    twist: Array | None = None
     specific_force: Array | None = None
 
     def index(self, s: Array, ticks: Array | None = None) -> Array:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from .._typing import Array
-from ..errors import InvalidInput, SpeedOutOfRange
+from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
 from .record import resample
+
+SCHEMA = 1
+"""Version of the file format."""
+_AGAIN = "practise again, and save it with TorqueLibrary.save"
 
 
 @dataclass(frozen=True)
@@ -49,3 +55,50 @@ class TorqueLibrary:
                 raise SpeedOutOfRange(float(speed), float(lowest), float(highest))
         position = np.interp(wanted, self.speeds, np.arange(len(self.speeds)))
         return np.asarray(resample(self.torque[None], position[None])[0])
+
+    def without(self, speed: float) -> TorqueLibrary:
+        """The library as if the practised speed next to the given one had not been practised."""
+        rest = np.arange(len(self.speeds)) != int(np.argmin(np.abs(self.speeds - speed)))
+        return TorqueLibrary(self.speeds[rest], self.torque[rest], self.spread[rest])
+
+    def save(self, path: Path | str) -> None:
+        """Write the library to an npz file, whole or not at all.
+
+        Raises:
+            FileProblem: It cannot be written.
+        """
+        path = Path(path)
+        partial = path.with_name(path.name + ".partial")
+        try:
+            with partial.open("wb") as file:
+                np.savez_compressed(
+                    file,
+                    schema=np.array(SCHEMA),
+                    speeds=self.speeds,
+                    torque=self.torque,
+                    spread=self.spread,
+                )
+            partial.replace(path)
+        except OSError as error:
+            raise cannot_write(path, error) from error
+
+    @classmethod
+    def load(cls, path: Path | str) -> TorqueLibrary:
+        """Read a library.
+
+        Raises:
+            FileProblem: The file is missing or damaged.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise FileProblem(path, "missing", _AGAIN)
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                if int(file["schema"]) != SCHEMA:
+                    raise FileProblem(path, f"schema {int(file['schema'])}, not {SCHEMA}", _AGAIN)
+                parts = [np.asarray(file[name], float) for name in ("speeds", "torque", "spread")]
+            if not all(np.isfinite(part).all() for part in parts):
+                raise ValueError("numbers that are not finite")
+            return cls(*parts)
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, InvalidInput) as error:
+            raise FileProblem(path, f"damaged ({error})", _AGAIN) from error

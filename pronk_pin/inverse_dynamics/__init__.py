@@ -1,5 +1,6 @@
 """Motor torques and contact forces for a given motion: eq. (2) solved for tau and lambda."""
 
+from .distribution import distribute_wrench, wrench_matrix
 from .solve import (
     GUIDE_COORDINATES,
     SAGITTAL_GUIDE,
@@ -14,6 +15,8 @@ __all__ = [
     "SAGITTAL_GUIDE",
     "Feedforward",
     "InverseDynamics",
+    "distribute_wrench",
     "feedforward",
     "inverse_dynamics",
+    "wrench_matrix",
 ]

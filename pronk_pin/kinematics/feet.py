@@ -14,16 +14,10 @@ from .._typing import Array, BoolArray
 from ..conventions import rotation_matrix
 from ..errors import InvalidInput
 from ..robot import JOINTS, NB, Robot
-from .legs import LegGeometry, leg_geometry, leg_motion, turn_y
-
-Knee = Literal["backward", "forward"]
-"""Which way a knee points; backward is a negative calf angle, as on the A1."""
-
-Hip = Literal["above", "below"]
-"""Whether the hip is above its foot, as in standing and walking, or below it."""
+from .legs import Hip, Knee, LegGeometry, leg_angles, leg_geometry, leg_motion
 
 _ROUND_OFF = 1e-9
-"""How far a joint limit [rad] or the reach of the links may be exceeded by round-off."""
+"""How far a joint limit [rad] may be exceeded by round-off."""
 
 
 class LegSolution(NamedTuple):
@@ -122,19 +116,10 @@ def leg_inverse_kinematics(
     known_name("knee", knee, ("backward", "forward"))
     known_name("hip", hip, ("above", "below"))
     offsets = LegGeometry(*(part[index] for part in leg_geometry(robot)))
-    target = as_array("positions", positions, 3, None) - offsets.hip
-    # The hip angle turns the plane y = side of the leg about x, until it holds the target.
-    side = offsets.thigh[1] + offsets.calf[1] + offsets.foot[1]
-    square = target[..., 1] ** 2 + target[..., 2] ** 2 - side**2
-    height = np.sqrt(np.maximum(square, 0.0)) * (-1.0 if hip == "above" else 1.0)
-    hip_angle = np.arctan2(target[..., 2], target[..., 1]) - np.arctan2(height, side)
-    x, z = target[..., 0] - offsets.thigh[0], height - offsets.thigh[2]
-    thigh_angle, calf_angle, in_plane = _two_links(offsets, x, z, knee)
-
+    positions = as_array("positions", positions, 3, None)
+    angles, reachable = leg_angles(offsets, positions, knee=knee, hip=hip)
     limits = slice(len(JOINTS) * index, len(JOINTS) * (index + 1))
-    angles = np.stack([hip_angle, thigh_angle, calf_angle], axis=-1)
     joints, within = _in_range(angles, robot.q_min[limits], robot.q_max[limits])
-    reachable = np.asarray(in_plane & (square >= -_ROUND_OFF))
     return LegSolution(joints, reachable, within)
 
 
@@ -228,20 +213,6 @@ def rotate_leg(robot: Robot, joints: npt.ArrayLike, delta: npt.ArrayLike) -> Arr
     return turned
 
 
-def _two_links(
-    offsets: LegGeometry, x: Array, z: Array, knee: Knee
-) -> tuple[Array, Array, BoolArray]:
-    """Thigh and calf angle that put the foot at (x, z) from the thigh joint; whether they can."""
-    calf, foot = offsets.calf, offsets.foot
-    upper, lower = np.hypot(calf[0], calf[2]), np.hypot(foot[0], foot[2])
-    cosine = (x**2 + z**2 - upper**2 - lower**2) / (2.0 * upper * lower)
-    bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if knee == "backward" else 1.0)
-    calf_angle = bend + _pitch(calf[0], calf[2]) - _pitch(foot[0], foot[2])
-    leg = calf + turn_y(calf_angle, foot)  # from the thigh joint to the foot at zero thigh angle
-    thigh_angle = _pitch(x, z) - _pitch(leg[..., 0], leg[..., 2])
-    return thigh_angle, calf_angle, np.asarray(np.abs(cosine) <= 1.0 + _ROUND_OFF)
-
-
 def _in_range(angles: Array, low: Array, high: Array) -> tuple[Array, BoolArray]:
     """Angles (..., 3) up to whole turns, as near the middle of their range as can be; whether all
     are within it, shape (...)."""
@@ -251,8 +222,3 @@ def _in_range(angles: Array, low: Array, high: Array) -> tuple[Array, BoolArray]
     joints = (angles - middle + np.pi) % (2.0 * np.pi) - np.pi + middle
     inside = (joints >= low - _ROUND_OFF) & (joints <= high + _ROUND_OFF)
     return joints, np.asarray(inside.all(axis=-1))
-
-
-def _pitch(x: Array, z: Array) -> Array:
-    """Angle about y that turns a vector pointing down into the direction of (x, z)."""
-    return np.arctan2(-x, -z)

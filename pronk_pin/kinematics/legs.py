@@ -10,13 +10,22 @@ with the offsets of `LegGeometry`.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from .._typing import Array
+from .._typing import Array, BoolArray
 from ..errors import InvalidInput
 from ..robot import JOINTS, Robot
+
+Knee = Literal["backward", "forward"]
+"""Which way a knee points; backward is a negative calf angle, as on the A1."""
+
+Hip = Literal["above", "below"]
+"""Whether the hip is above its foot, as in standing and walking, or below it."""
+
+_ROUND_OFF = 1e-9
+"""How far the reach of the links may be exceeded by round-off."""
 
 _AXES = {"hip": "RX", "thigh": "RY", "calf": "RY"}
 
@@ -104,6 +113,79 @@ def leg_motion(geometry: LegGeometry, joints: Array, rates: Array) -> LegMotion:
         velocity=turn_x(hip, velocity),
         calf_rate=turn_x(hip, spin),
     )
+
+
+class ContactPoints(NamedTuple):
+    """Where feet touch the ground, in the trunk's frame."""
+
+    position: Array
+    """From the trunk's origin [m], shape (..., legs, 3)."""
+    jacobian: Array
+    """Velocities of the feet's material points there for unit joint rates, as seen from the trunk,
+    shape (..., legs, 3, 3); the last axis is hip, thigh, calf."""
+
+
+def contact_points(geometry: LegGeometry, joints: Array, down: Array) -> ContactPoints:
+    """The points of the feet at `down` from their centres, and the Jacobians of their legs.
+
+    Args:
+        geometry: Offsets of the legs.
+        joints: Joint angles [rad], shape (..., legs, 3).
+        down: From the centres to the contacts, in the trunk's frame [m], shape (..., 3).
+    """
+    shape = (*joints.shape[:-2], 3, *joints.shape[-2:])  # an axis for the joint that moves
+    rates = np.broadcast_to(np.eye(3)[:, None], shape)
+    motion = leg_motion(geometry, np.broadcast_to(joints[..., None, :, :], shape), rates)
+    columns = motion.velocity + np.cross(motion.calf_rate, down[..., None, None, :])
+    position = motion.position[..., 0, :, :] + down[..., None, :]
+    return ContactPoints(position, np.moveaxis(columns, -3, -1))
+
+
+def leg_angles(
+    geometry: LegGeometry, positions: Array, *, knee: Knee = "backward", hip: Hip = "above"
+) -> tuple[Array, BoolArray]:
+    """Joint angles that put the feet's centres somewhere, and whether the links reach there.
+
+    Args:
+        geometry: Offsets of the legs, or of one leg.
+        positions: Foot centres from the trunk's origin, in the trunk's frame [m], shape
+            (..., legs, 3), or (..., 3) for one leg.
+        knee: Branch of the knee.
+        hip: Branch of the hip: above the foot or below it.
+
+    Returns:
+        Hip, thigh and calf angle [rad], up to whole turns, shape (..., 3), those of the stretched
+        or folded leg where the target is out of reach; shape (...).
+    """
+    # The hip angle turns the plane y = side of the leg about x, until it holds the target.
+    target = positions - geometry.hip
+    side = geometry.thigh[..., 1] + geometry.calf[..., 1] + geometry.foot[..., 1]
+    square = target[..., 1] ** 2 + target[..., 2] ** 2 - side**2
+    height = np.sqrt(np.maximum(square, 0.0)) * (-1.0 if hip == "above" else 1.0)
+    hip_angle = np.arctan2(target[..., 2], target[..., 1]) - np.arctan2(height, side)
+    x, z = target[..., 0] - geometry.thigh[..., 0], height - geometry.thigh[..., 2]
+    thigh_angle, calf_angle, in_plane = _two_links(geometry, x, z, knee)
+    reachable = np.asarray(in_plane & (square >= -_ROUND_OFF))
+    return np.stack([hip_angle, thigh_angle, calf_angle], axis=-1), reachable
+
+
+def _two_links(
+    offsets: LegGeometry, x: Array, z: Array, knee: Knee
+) -> tuple[Array, Array, BoolArray]:
+    """Thigh and calf angle that put the foot at (x, z) from the thigh joint; whether they can."""
+    calf, foot = offsets.calf, offsets.foot
+    upper, lower = np.hypot(calf[..., 0], calf[..., 2]), np.hypot(foot[..., 0], foot[..., 2])
+    cosine = (x**2 + z**2 - upper**2 - lower**2) / (2.0 * upper * lower)
+    bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if knee == "backward" else 1.0)
+    calf_angle = bend + _pitch(calf[..., 0], calf[..., 2]) - _pitch(foot[..., 0], foot[..., 2])
+    leg = calf + turn_y(calf_angle, foot)  # from the thigh joint to the foot at zero thigh angle
+    thigh_angle = _pitch(x, z) - _pitch(leg[..., 0], leg[..., 2])
+    return thigh_angle, calf_angle, np.asarray(np.abs(cosine) <= 1.0 + _ROUND_OFF)
+
+
+def _pitch(x: Array, z: Array) -> Array:
+    """Angle about y that turns a vector pointing down into the direction of (x, z)."""
+    return np.arctan2(-x, -z)
 
 
 def turn_x(angle: Array, vector: Array) -> Array:

@@ -1,29 +1,43 @@
-"""The report: tables, figures and provenance in one self-contained HTML file."""
+"""The report of a result: the answer, tables, figures, limitations and where the numbers are from.
+
+One document, written as a self-contained report.html and as report.md with its figures beside it.
+"""
 
 from __future__ import annotations
 
-import base64
-import html
-from collections.abc import Iterator, Mapping
+import textwrap
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
 
 from ..compare import Results
-from ..compare.tables import SHOWN, beside_the_paper, overview
-from ..compare.words import verdict
+from ..compare.limits import limitations
+from ..compare.practice import RIVAL, VARIABLES, Practice, practice
+from ..compare.statistics import CONFIDENCE, LEAST_UNITS, family
+from ..compare.suites import SUITES, load_suite
+from ..compare.tables import SHOWN, answer, beside_the_paper
+from ..compare.words import (
+    LEARNER,
+    against_model,
+    beat_text,
+    between,
+    families,
+    number,
+    suite_verdict,
+    verdict,
+)
 from ..errors import cannot_write
-from . import figures
-from .style import figure_bytes, save_figure
+from . import figures, suite_figures
+from .document import Document
+from .style import save_figure
 
 SHOWN_SPEED = 0.3
 """Speed of the tracking figure [m/s]: the paper's."""
 
-LEARNER = "ilc"
-"""Controller whose learning the figures show."""
+FIGURES = "figures"
+"""Folder of the figures of report.md."""
 
 _CAPTIONS = {
     "errors": "Peak stance error by speed, beside the paper's Table I.",
@@ -36,79 +50,66 @@ _CAPTIONS = {
     "difference": "What practice adds to the model: learned minus the model's feedforward torque.",
 }
 
-_LIMITS = (
-    "The trunk is locked to the sagittal plane without rotation, as in the paper.",
-    "Learning acts in stance only; what is left of the error is the touchdown transient, which "
-    "comes from tracking in flight.",
-    "Peaks are against the unmodified reference, as means over the legs and the last 30 strides; "
-    "the paper does not say how its peaks are taken.",
-    "Errors count from when the touchdown is felt; the metric contact_error in summary.csv counts "
-    "from the contact itself, one to two ticks earlier.",
-    "One seed stands for one scatter of the starting posture; there are no intervals.",
+_READING = (
+    "Errors are peaks of the joint angle's error in stance, means over legs, the last 30 strides "
+    f"and the robots that did not fall. Intervals hold {CONFIDENCE:.0%} (BCa bootstrap). The unit "
+    f"that is drawn is the seed with its sampled world, or the speed where there are fewer than "
+    f"{LEAST_UNITS} of them. A controller is better or worse than the model where the interval of "
+    "the paired difference excludes 0, else the matter is open. Wins are the share of the robots "
+    "whose error is smaller than the same robot's with the model (Wilson interval). The model is "
+    "beaten at the first stride below its level from which on the mean over five strides stays "
+    "below, in calf and thigh."
 )
-
-_PAGE = Template("""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>$title</title><style>
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem;
-  color: #222; }
-h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2rem; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 13px; }
-th, td { padding: .15rem .6rem; text-align: right; } thead th { border-bottom: 1px solid #888; }
-tr:last-child td, tr:last-child th { border-bottom: 1px solid #888; }
-.verdict { background: #eef4fa; border-left: 4px solid #0072B2; padding: .6rem 1rem; }
-figure { margin: 1rem 0; } img { max-width: 100%; }
-figcaption, .note { color: #555; font-size: 13px; }
-code { background: #f2f2f2; padding: 0 .25rem; }
-</style></head><body>
-<h1>$title</h1>
-<p class="verdict">$verdict</p>
-$body
-<h2 id="limits">Known limitations</h2><ul>$limits</ul>
-<h2 id="provenance">Where these numbers come from</h2>
-<p>Made again by <code>$command</code>. Every number stands in <code>summary.csv</code>,
-every stride in <code>strides/</code>.</p>
-$provenance
-</body></html>
-""")
 
 
 def write_report(results: Results) -> Path:
-    """Write report.html into the results folder.
+    """Write report.html, report.md and its figures into the results folder.
+
+    Returns:
+        The path of report.html.
 
     Raises:
         FileProblem: The summary or the strides are missing or damaged, or it cannot be written.
     """
-    path = results.folder / "report.html"
-    text = report_html(results)
+    document = report(results)
+    path = results.write("report.html", document.to_html())
+    folder = results.folder / FIGURES
     try:
-        path.write_text(text, encoding="utf-8")
+        folder.mkdir(exist_ok=True)
     except OSError as error:
-        raise cannot_write(path, error) from error
+        raise cannot_write(folder, error) from error
+    for name, picture in document.pictures().items():
+        results.write(f"{FIGURES}/{name}", picture)
+    results.write("report.md", document.to_markdown(FIGURES))
     return path
 
 
-def report_html(results: Results) -> str:
-    """The report as one HTML page without references to anything outside it."""
-    summary = results.summary()
-    sections = [
-        section
-        for scenario in results.experiment.scenarios
-        for section in _scenario(results, summary, scenario)
-    ]
-    first = results.experiment.scenarios[0]
-    return _PAGE.substitute(
-        title=f"Does practice beat the model? {results.experiment.robot.upper()}, pronking",
-        verdict=html.escape(verdict(summary, scenario=first)),
-        body="\n".join(sections),
-        limits="".join(f"<li>{html.escape(text)}</li>" for text in _LIMITS),
-        command=html.escape(command(results)),
-        provenance=_provenance(results.provenance),
-    )
+def report(results: Results) -> Document:
+    """The report as a document."""
+    summary, worlds = results.summary(), families(results.experiment.scenarios)
+    document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
+    table = answer(summary)
+    if len(worlds) > 1:
+        document.text(suite_verdict(summary, table=table), "verdict")
+        _all_worlds(document, results, table)
+    else:
+        document.text(verdict(summary, scenario=worlds[0], table=table.loc[worlds[0]]), "verdict")
+    for world in worlds:
+        _world(document, results, summary, table, world)
+    document.heading("How to read the numbers", "statistics")
+    document.text(_READING)
+    document.heading("Known limitations", "limits")
+    document.bullets(limitations(results))
+    _provenance(document, results)
+    return document
 
 
 def command(results: Results) -> str:
     """The command that makes this result again."""
     experiment = results.experiment
+    for name in SUITES:
+        if load_suite(name) == experiment:
+            return f"pronk-pin compare --suite {name}"
     words = ["pronk-pin compare", f"--robot {experiment.robot}"]
     words += ["--speeds " + " ".join(f"{speed:g}" for speed in experiment.speeds)]
     words += ["--controllers " + " ".join(experiment.controllers)]
@@ -116,7 +117,8 @@ def command(results: Results) -> str:
     words += ["--seeds " + " ".join(map(str, experiment.seeds))]
     schedule = experiment.schedule
     words += [
-        f"--schedule.practice {schedule.practice:g} --schedule.learning {schedule.learning:g}"
+        f"--schedule.{name} {getattr(schedule, name):g}"
+        for name in ("startup", "practice", "learning", "scatter")
     ]
     return " ".join(words)
 
@@ -141,12 +143,14 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
 
 
 def write_figures(results: Results, folder: Path) -> list[Path]:
-    """Write the figures of the first scenario into a folder, each as SVG and as PDF.
+    """Write the figures of the first scenario, and those over all, each as SVG and as PDF.
 
     Raises:
         FileProblem: The folder cannot be written, or the result is damaged.
     """
     found = scenario_figures(results, results.experiment.scenarios[0])
+    if len(families(results.experiment.scenarios)) > 1:
+        found |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
     return [
         save_figure(figure, folder / f"{name}.{suffix}")
         for name, figure in found.items()
@@ -154,85 +158,172 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     ]
 
 
-def _scenario(results: Results, summary: pd.DataFrame, scenario: str) -> Iterator[str]:
-    """The sections about one scenario."""
-    found = scenario_figures(results, scenario)
-    yield f'<h2 id="{scenario}">Controllers in the scenario "{html.escape(scenario)}"</h2>'
-    yield _overview(overview(summary, scenario=scenario))
-    yield _figure(found, "errors")
-    yield _figure(found, "learning")
+def _all_worlds(document: Document, results: Results, table: pd.DataFrame) -> None:
+    """What comes out over all worlds: a row a world, the heat map, and the learning."""
+    document.heading("All worlds", "worlds")
+    controllers = set(table.index.get_level_values("controller"))
+    if LEARNER in controllers:
+        document.text("A row a world: peak error under practice (ILC) beside PD and the model.")
+        document.table(_world_rows(table))
+    for name, (figure, caption) in _suite_figures(results, table).items():
+        document.picture(name, figure, caption)
+
+
+def _suite_figures(
+    results: Results, table: pd.DataFrame | None = None
+) -> dict[str, tuple[Figure, str]]:
+    """Figures over all worlds with their captions."""
+    table = answer(results.summary()) if table is None else table
+    practised: dict[str, list[Practice]] = {}
+    for cell in results.experiment.cells():
+        one = practice(results.strides(cell, VARIABLES))
+        practised.setdefault(family(cell.scenario), []).append(one)
+    ordered = {name: practised[name] for name in families(results.experiment.scenarios)}
+    return {
+        "heat-map": (
+            suite_figures.heat_map(table),
+            "Mean peak stance error by world and controller, in milliradians.",
+        ),
+        **{
+            f"practice-{joint}": (
+                suite_figures.practice_curves(ordered, joint=joint),
+                f"The {joint}'s peak error over the strides of learning, with the levels of PD "
+                "and of the model's feedforward; bands from the first to the third quartile.",
+            )
+            for joint in SHOWN
+        },
+    }
+
+
+def _world_rows(table: pd.DataFrame) -> pd.DataFrame:
+    """One row a world about `ilc`, beside `pd` and `model`."""
+    rows = {}
+    for world, row in table.xs(LEARNER, level="controller").iterrows():
+        cells: dict[str, str] = {}
+        for joint in SHOWN:
+            for other in ("pd", RIVAL):
+                if (world, other) in table.index:
+                    value = table.loc[(world, other), joint]
+                    cells[f"{joint} [rad]: {figures.LABELS[other]}"] = number(value, ".4f")
+            cells[f"{joint} [rad]: ILC"] = _with_interval(row, joint, ".4f")
+        cells["better than model (calf/thigh)"] = against_model(row)
+        cells["strides to beat it"] = beat_text(row)
+        rows[str(world)] = cells
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def _with_interval(row: pd.Series, name: str, form: str) -> str:
+    """A mean with its interval: "0.0224 (0.0216 to 0.0237)"."""
+    value, ends = number(row.get(name, float("nan")), form), between(row, name, form)
+    return value if ends == "-" else f"{value} ({ends})"
+
+
+def _world(
+    document: Document, results: Results, summary: pd.DataFrame, table: pd.DataFrame, world: str
+) -> None:
+    """The section about one world; the first one has all figures."""
+    worlds = families(results.experiment.scenarios)
+    document.heading(f"Controllers in the world `{world}`".replace("`", '"'), world)
+    if len(worlds) > 1:
+        document.text(verdict(summary, scenario=world, table=table.loc[world]))
+    document.table(_errors(table.loc[world]))
+    document.table(_motion(table.loc[world]))
+    units = sorted(set(table.loc[world]["unit"]))
+    document.text(f"Intervals are drawn over the {' and '.join(units)}s.", "note")
+    if world != worlds[0] or world not in results.experiment.scenarios:
+        return
+    found = scenario_figures(results, world)
+    document.picture("errors", found["errors"], _CAPTIONS["errors"])
+    document.picture("learning", found["learning"], _CAPTIONS["learning"])
     if {"pd", LEARNER} <= set(results.experiment.controllers):
-        yield f'<h2 id="{scenario}-table">Table I, beside the paper\'s</h2>'
-        yield _table_1(beside_the_paper(summary, scenario=scenario))
+        document.heading("Table I, beside the paper's", f"{world}-table", level=3)
+        document.table(_table_1(beside_the_paper(summary, scenario=world)))
+        document.text(
+            "The last row holds the means of the peaks, and the reduction of the mean (the paper "
+            "prints the mean of its reductions: 75.8 % and 30.8 %).",
+            "note",
+        )
     if "tracking" in found:
-        yield f'<h2 id="{scenario}-learned">Before and after, and what was learned</h2>'
-        yield _figure(found, "tracking")
-        for name in ("torques", "surface", "difference"):
+        document.heading("Before and after, and what was learned", f"{world}-learned", level=3)
+        for name in ("tracking", "torques", "surface", "difference"):
             if name in found:
-                yield _figure(found, name)
+                document.picture(name, found[name], _CAPTIONS[name])
 
 
-def _overview(table: pd.DataFrame) -> str:
-    shown = pd.DataFrame(index=[figures.LABELS.get(name, name) for name in table.index])
-    for joint in SHOWN:
-        shown[f"{joint} peak [rad]"] = [f"{value:.4f}" for value in table[joint]]
-        if f"{joint}_reduction" in table:
-            shown[f"{joint} less than PD"] = [f"{x:.0%}" for x in table[f"{joint}_reduction"]]
-        shown[f"{joint} RMS [rad]"] = [f"{value:.4f}" for value in table[f"{joint}_rms"]]
-    shown["strides to converge"] = [_count(value) for value in table["strides"]]
-    shown["feedback's share"] = [f"{value:.0%}" for value in table["feedback"]]
-    shown["speed error [m/s]"] = [f"{value:.3f}" for value in table["speed_error"]]
-    shown["apex error [mm]"] = [f"{1e3 * value:.1f}" for value in table["apex_error"]]
-    counts = zip(table["upright"], table["robots"], strict=True)
-    shown["upright"] = [f"{up:.0f} of {robots:.0f}" for up, robots in counts]
-    return str(shown.to_html(border=0))
+def _errors(table: pd.DataFrame) -> pd.DataFrame:
+    """Errors of the controllers in a world, with intervals."""
+    rows = {}
+    for name, row in table.iterrows():
+        cells: dict[str, str] = {}
+        for joint in SHOWN:
+            cells[f"{joint}: peak [rad]"] = _with_interval(row, joint, ".4f")
+            cells[f"{joint}: less than PD"] = _with_interval(row, f"{joint}_reduction", ".0%")
+            cells[f"{joint}: wins against model"] = _with_interval(row, f"{joint}_wins", ".0%")
+        rows[figures.LABELS.get(str(name), str(name))] = cells
+    return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def _table_1(table: pd.DataFrame) -> str:
+def _motion(table: pd.DataFrame) -> pd.DataFrame:
+    """What else is to be known of the controllers in a world."""
+    rows = {}
+    for name, row in table.iterrows():
+        cells = {f"{joint}: RMS [rad]": number(row[f"{joint}_rms"], ".4f") for joint in SHOWN}
+        cells["better than model (calf/thigh)"] = against_model(row)
+        cells["strides to beat it"] = beat_text(row)
+        cells["strides to converge"] = number(row["strides"], ".0f")
+        cells["feedback's share"] = number(row["feedback"], ".0%")
+        cells["cost of transport"] = number(row["cost"], ".2f")
+        cells["speed error [m/s]"] = number(row["speed_error"], ".3f")
+        cells["apex error [mm]"] = number(1e3 * row["apex_error"], ".1f")
+        cells["upright"] = f"{row['upright']:.0f} of {row['robots']:.0f}"
+        rows[figures.LABELS.get(str(name), str(name))] = cells
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def _table_1(table: pd.DataFrame) -> pd.DataFrame:
     shown = table.copy().astype(object)
     for column in table.columns:
-        form = "{:.0%}" if column[2] == "reduction" else "{:.3f}"
-        shown[column] = [form.format(v) if pd.notna(v) else "" for v in table[column]]
+        form = ".0%" if column[2] == "reduction" else ".3f"
+        shown[column] = [number(value, form) for value in table[column]]
     names = {"ours": "this run", "paper": "paper"}
     shown.columns = pd.MultiIndex.from_tuples(
         [(f"{joint} [rad]", names[source], name) for joint, source, name in shown.columns]
     )
     shown.index = pd.Index([s if isinstance(s, str) else f"{s:g}" for s in table.index])
-    note = (
-        '<p class="note">The last row holds the means of the peaks, and the reduction of the mean '
-        "(the paper prints the mean of its reductions: 75.8 % and 30.8 %).</p>"
+    return shown
+
+
+def _provenance(document: Document, results: Results) -> None:
+    document.heading("Where these numbers come from", "provenance")
+    document.text("Made again, to the bit with the same versions, by")
+    document.text("\n".join(textwrap.wrap(command(results), 100)), "code")
+    document.text(
+        "Every number stands in `summary.csv`, every stride in `strides/`, who made them and when "
+        "in `provenance.json`."
     )
-    return str(shown.to_html(border=0)) + note
+    runs = results.provenance["runs"]
+    for k, run in enumerate(runs):
+        if len(runs) > 1:
+            document.heading(f"Run {k + 1} of {len(runs)}", f"run-{k + 1}", level=3)
+        rows = pd.DataFrame.from_dict(_run(run), orient="index", columns=[""])
+        document.table(rows, left=True)
+    seeds = ", ".join(map(str, results.experiment.seeds))
+    document.text(f"Seeds: {seeds}. One stream a seed, the same for every controller.")
 
 
-def _provenance(provenance: Any) -> str:
-    rows = {}
-    for run in provenance["runs"]:
-        rows = {
-            "versions": ", ".join(f"{k} {v}" for k, v in run["versions"].items()),
-            "Python": run["python"],
-            "system": run["platform"],
-            "CPU": f"{run['cpu']} ({run['cores']} cores)",
-            "wall time": f"{run.get('wall_time_s', float('nan')):g} s",
-        }
-    cells = "".join(
-        f"<tr><th>{html.escape(k)}</th><td style='text-align:left'>{html.escape(str(v))}</td></tr>"
-        for k, v in rows.items()
-    )
-    return f"<table>{cells}</table>"
-
-
-def _figure(found: Mapping[str, Figure], name: str) -> str:
-    """A figure as an inline SVG picture with its caption."""
-    data, text = (
-        base64.b64encode(figure_bytes(found[name], "svg")).decode(),
-        html.escape(_CAPTIONS[name]),
-    )
-    return (
-        f'<figure><img alt="{text}" src="data:image/svg+xml;base64,{data}">'
-        f"<figcaption>{text}</figcaption></figure>"
-    )
-
-
-def _count(value: float) -> str:
-    return f"{value:.0f}" if pd.notna(value) else "-"
+def _run(run: dict[str, Any]) -> dict[str, str]:
+    cells = run.get("cells", {})
+    simulated = sum(times["simulation_s"] for times in cells.values())
+    encoded = sum(times["encoding_s"] for times in cells.values())
+    wall = f"{run['wall_time_s']:g} s" if "wall_time_s" in run else "not finished"
+    return {
+        "began": run["started"],
+        "wall time": f"{wall}; {len(cells)} cells, {simulated:.0f} s simulating and "
+        f"{encoded:.0f} s packing their files; summary {run.get('summary_s', float('nan')):g} s",
+        "by": run["executor"],
+        "versions": ", ".join(f"{name} {version}" for name, version in run["versions"].items()),
+        "source": run["git"] or "not under version control",
+        "Python": run["python"],
+        "system": run["platform"],
+        "CPU": f"{run['cpu']} ({run['cores']} cores)",
+    }

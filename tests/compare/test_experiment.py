@@ -109,7 +109,7 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
         ({"speeds": ()}, "speeds must name at least one, and none of them twice"),
         ({"controllers": ("pd", "pd")}, "controllers must name at least one, and none of them"),
         ({"seeds": (0, -1)}, "seeds must not be negative"),
-        ({"base": "free"}, "base 'free' is not available; the base can be: locked"),
+        ({"base": "flying"}, "unknown base 'flying'; choose one of: locked, sagittal, free"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
 )

@@ -71,13 +71,13 @@ def test_the_robot_of_an_mjcf_is_that_of_the_urdf_it_was_written_from(
 ) -> None:
     robot = load_robot(name)
     path = mjcf(robot, tmp_path / "robot.xml")
-    model = build_model(robot, replace(IDEAL, mjcf=str(path)), free=True)
+    model = build_model(robot, replace(IDEAL, mjcf=str(path)), base="free")
     parity = compare_models(robot, model, states=20, tolerance=SIX_DIGITS)
     assert parity.bias is not None
     assert parity.bias < SIX_DIGITS
     other = {row.what for row in parity.differences}
     assert other <= {"armature", "damping", "friction", "torque limits"}
-    own = build_model(robot, IDEAL, free=True)
+    own = build_model(robot, IDEAL, base="free")
     np.testing.assert_allclose(model.body_mass, own.body_mass, rtol=1e-5)
 
 

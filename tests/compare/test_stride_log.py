@@ -48,7 +48,7 @@ def stride(log: StrideLog, k: int = 0, *, left: float = 9.0) -> None:
     height = 0.34 - 0.1 * np.linspace(-1.0, 1.0, FLIGHT) ** 2
     flight = StrideRecord.of(0.5 * error, error, 2.0 * error, 3.0 * error)
     log.flight(ROW, flight, ticks(FLIGHT, height, joint=k + 0.5), length(FLIGHT))
-    log.end(ROW, np.array([0.4]), np.array([0.2]), YES, np.array([3]))
+    log.end(ROW, np.array([0.4]), np.array([0.2]), YES, np.array([3]), tilt=0.1, heading=0.2)
 
 
 @pytest.fixture
@@ -70,6 +70,8 @@ def test_a_stride_goes_from_touchdown_to_touchdown(log: StrideLog) -> None:
             "upright": 1.0,
             "learning": 1.0,
             "skipped": 3.0,
+            "tilt": 0.1,
+            "heading": 0.2,
         }
     )
 
@@ -134,7 +136,8 @@ def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
     states = rng.normal(size=(2, 20, 28))
     force, path = rng.normal(size=(2, 20, 4, 3)), np.zeros((2, 21, 1))
     joints, rates = states[..., :12], states[..., 12:24]
-    motion = Motion(states[..., 24:26], states[..., 26:], joints, rates, force, path)
+    pose, twist = rng.normal(size=(2, 20, 7)), rng.normal(size=(2, 20, 6))
+    motion = Motion(states[..., 24:26], states[..., 26:], joints, rates, force, path, pose, twist)
     reference, feedforward = rng.normal(size=(2, 2, 25, 12))
     tape = Tape(feedforward, reference, 0.0 * reference, np.full(2, 25), begin=5)
     limit, gains = np.full(12, 20.0), Gains()
@@ -145,6 +148,8 @@ def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
 
     np.testing.assert_array_equal(phase.joints[:, 5:], joints)
     np.testing.assert_array_equal(log.force[rows, 5:25], force)
+    np.testing.assert_array_equal(log.pose[rows, 5:25], pose)
+    np.testing.assert_array_equal(phase.twist[:, 5:], twist)
     asked = feedforward[:, 5:] + gains.proportional * (reference[:, 5:] - joints)
     asked -= gains.derivative * rates
     np.testing.assert_allclose((phase.feedback + phase.feedforward)[:, 5:], asked)

@@ -60,8 +60,8 @@ def test_the_verdict_over_all_worlds_counts_them_and_names_the_exceptions(
     other.loc[down, "value"] = 0.0
     words = suite_verdict(pd.concat([summary, other], ignore_index=True))
     assert "In 2 worlds" in words
-    assert "in the calf it is better in 2 of 2." in words
-    assert "in the thigh it is better in 0 of 2; worse in nominal, slope." in words
+    assert "In the calf it is better in 2 of 2." in words
+    assert "In the thigh it is better in 0 of 2; worse in nominal, slope." in words
     assert "2 of 4 robots come to beat it in both joints" in words
     assert "Robots fell: 1 of 2 in slope under pd." in words
 

@@ -60,7 +60,7 @@ def stand(robot: Robot, world: World, joints: Array, seconds: float) -> None:
 def test_mass_and_centre_of_mass_are_the_urdfs_and_the_payloads(
     robot: Robot, scenario: Scenario
 ) -> None:
-    model = build_model(robot, scenario, free=True)
+    model = build_model(robot, scenario, base="free")
     data = data_at(robot, model, robot.standing)
     own = pin.centerOfMass(robot.model, robot.model.createData(), robot.standing)
     own = own + robot.model.inertias[1].mass / robot.mass * np.array(scenario.com_shift)
@@ -76,7 +76,7 @@ def test_mass_and_centre_of_mass_are_the_urdfs_and_the_payloads(
     "scenario", [IDEAL, LOADED, HIGH, SHIFTED], ids=lambda scenario: scenario.name
 )
 def test_the_mass_matrix_is_pinocchios_with_the_payload(robot: Robot, scenario: Scenario) -> None:
-    model, reference = build_model(robot, scenario, free=True), loaded_model(robot, scenario)
+    model, reference = build_model(robot, scenario, base="free"), loaded_model(robot, scenario)
     rng = np.random.default_rng(3)
     q = robot.standing.copy()
     q[3:7] = rng.normal(size=4)
@@ -95,7 +95,7 @@ def test_the_mass_matrix_is_pinocchios_with_the_payload(robot: Robot, scenario: 
 def test_the_rotors_stand_on_the_diagonal_of_the_mass_matrix(robot: Robot) -> None:
     masses = np.zeros((2, 18, 18))
     for mass, armature in zip(masses, (0.0, 0.02), strict=True):
-        model = build_model(robot, replace(IDEAL, armature=armature), free=True)
+        model = build_model(robot, replace(IDEAL, armature=armature), base="free")
         mujoco.mj_fullM(model, data_at(robot, model, robot.standing), mass)
     np.testing.assert_allclose(masses[1] - masses[0], np.diag([0.0] * 6 + [0.02] * 12), atol=1e-12)
 
@@ -118,7 +118,7 @@ def test_the_feet_are_where_pinocchio_has_them(robot: Robot) -> None:
 def test_every_robot_has_a_world_with_its_dynamics_and_its_feet(name: str) -> None:
     """Feet of meshes become spheres of the robot's foot radius, and weigh nothing."""
     robot = load_robot(name)
-    model = build_model(robot, LOADED, free=True)
+    model = build_model(robot, LOADED, base="free")
     parity = compare_models(replace(robot, model=loaded_model(robot, LOADED)), model, states=20)
     assert parity.mass_matrix is not None
     assert parity.bias is not None
@@ -192,7 +192,7 @@ def test_a_softer_ground_gives_way_more(robot: Robot) -> None:
 def test_rotor_and_friction_come_on_top_of_the_robots_own(name: str) -> None:
     robot = load_robot(name)
     added = replace(IDEAL, armature=0.02, damping=0.3, coulomb=0.4)
-    model = build_model(robot, added, free=True)
+    model = build_model(robot, added, base="free")
     dofs = [model.joint(joint).dofadr[0] for joint in robot.joint_names]
     own = robot.model
     np.testing.assert_allclose(model.dof_armature[dofs], own.armature[6:] + 0.02)

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy import signal
 
 from pronk_pin.control import ZeroPhaseFilter, phase_grid
 from pronk_pin.control.filters import PAPER_A, PAPER_B, first_order, look_ahead
-from pronk_pin.errors import InvalidInput
+from pronk_pin.errors import InvalidInput, LeakyFilter
 
 LEARNING = ZeroPhaseFilter.butterworth(3, 0.04)
 PAPER = ZeroPhaseFilter(PAPER_B, PAPER_A)
@@ -78,3 +80,20 @@ def test_a_speed_filter_without_time_constant_passes_everything() -> None:
     values = np.random.default_rng(0).normal(size=(2, 20))
     passed = first_order(values, np.zeros(2), time_constant=0.0, timestep=1e-3)
     np.testing.assert_allclose(passed, values)
+
+
+def test_a_filter_that_leaks_warns_and_says_how_much() -> None:
+    with pytest.warns(LeakyFilter, match=r"DC gain of 0\.64 .* loses 36% of a constant torque"):
+        PAPER.warn()
+
+
+def test_a_filter_that_does_not_leak_is_silent() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        LEARNING.warn()
+
+
+@pytest.mark.parametrize(("order", "cutoff"), [(0, 0.1), (3, 0.0), (3, 1.0)])
+def test_a_filter_by_cut_off_that_cannot_be_is_refused(order: int, cutoff: float) -> None:
+    with pytest.raises(InvalidInput, match="give an order of 1 or more and a cut-off between"):
+        ZeroPhaseFilter.butterworth(order, cutoff)

@@ -129,13 +129,13 @@ def errors(law: ModelBasedILC, model: LiftedModel, strides: int) -> Array:
 
 def test_plant_inversion_needs_one_stride_where_the_model_is_right() -> None:
     model = toy(np.random.default_rng(0))
-    norms = errors(PlantInversionILC(gain=1.0, cutoff=1e-6), model, 1)
+    norms = errors(PlantInversionILC(gain=1.0, cutoff=1e-6, splines=None, horizon=1), model, 1)
     assert norms[1] < 1e-10 * norms[0]
 
 
 def test_plant_inversion_diverges_where_the_plant_is_more_than_twice_the_model() -> None:
     model = toy(np.random.default_rng(0))
-    law = PlantInversionILC(gain=1.0, cutoff=1e-6).along([model])
+    law = PlantInversionILC(gain=1.0, cutoff=1e-6, splines=None, horizon=1).along([model])
     for factor, grows in ((1.9, False), (2.1, True)):
         plant = model.scaled(factor)
         begin = plant.planned
@@ -144,7 +144,11 @@ def test_plant_inversion_diverges_where_the_plant_is_more_than_twice_the_model()
 
 
 def test_the_norm_optimal_law_converges_monotonically() -> None:
-    norms = errors(NormOptimalILC(change=0.5, effort=0.0), toy(np.random.default_rng(1)), 60)
+    norms = errors(
+        NormOptimalILC(change=0.5, effort=0.0, splines=None, horizon=1),
+        toy(np.random.default_rng(1)),
+        60,
+    )
     assert np.all(np.diff(norms) < 0.0)
     assert norms[-1] < 1e-3 * norms[0]
 
@@ -152,7 +156,8 @@ def test_the_norm_optimal_law_converges_monotonically() -> None:
 def test_the_norm_optimal_law_minimises_what_it_says() -> None:
     model, change, effort = toy(np.random.default_rng(2)), 0.3, 0.2
     begin = model.planned
-    u = NormOptimalILC(change=change, effort=effort).along([model]).update(begin).reshape(-1)
+    law = NormOptimalILC(change=change, effort=effort, splines=None, horizon=1).along([model])
+    u = law.update(begin).reshape(-1)
     gradient = -model.angle.T @ (begin.error.reshape(-1) - model.angle @ u) + (change + effort) * u
     np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
 
@@ -172,3 +177,46 @@ def test_the_memory_never_holds_more_than_the_motor_can_give() -> None:
     record = StrideRecord.of(none, none, none, none)
     held = anti_windup(np.full(SHAPE, 50.0), record, np.full(12, 33.5))
     np.testing.assert_array_equal(held, 33.5)
+
+
+def carried(rng: np.random.Generator) -> LiftedModel:
+    """The toy whose touchdown does once more, and by half more, what a feedforward did."""
+    own = toy(rng)
+    return replace(
+        own,
+        angle_start=1.5 * own.angle,
+        rate_start=np.zeros_like(own.angle),
+        carry=np.zeros_like(own.angle),
+        push=np.eye(TOY),
+    )
+
+
+def test_only_a_law_that_looks_ahead_is_stable_where_the_touchdown_outdoes_the_stride() -> None:
+    model = carried(np.random.default_rng(4))
+    begin, left = model.planned, {}
+    for horizon in (1, 4):
+        law = NormOptimalILC(change=0.01, splines=None, horizon=horizon).along([model])
+        record, state = begin, np.zeros((1, TOY))
+        for _ in range(20):
+            learned = law.update(record)
+            state = model.land(record.feedforward, begin, state)
+            record = model.stride(learned, begin, state)
+        left[horizon] = np.linalg.norm(record.error) / np.linalg.norm(begin.error)
+    assert left[1] > 10.0
+    assert left[4] < 0.1
+
+
+def test_a_feedforward_of_splines_has_no_chatter() -> None:
+    rng = np.random.default_rng(5)
+    answer = np.eye(3 * SAMPLES)
+    model = LiftedModel.with_resets(
+        answer, np.zeros_like(answer), gains=Gains(), torque=rng.normal(size=(SAMPLES, 3))
+    )
+    learned = NormOptimalILC().along([model]).update(model.planned)[0, :, 0]
+    power = np.abs(np.fft.rfft(learned)) ** 2
+    assert power[16:].sum() < 0.01 * power.sum()
+
+
+def test_a_law_of_too_few_splines_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="splines > 3"):
+        NormOptimalILC(splines=3)

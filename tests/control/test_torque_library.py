@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from pronk_pin.control import SAMPLES, TorqueLibrary
-from pronk_pin.errors import InvalidInput, SpeedOutOfRange
+from pronk_pin.errors import FileProblem, InvalidInput, SpeedOutOfRange
 
 SPEEDS = np.array([-0.1, 0.0, 0.3])
 
@@ -49,3 +51,41 @@ def test_every_speed_needs_a_torque() -> None:
     torque = np.zeros((2, 2, SAMPLES, 12))
     with pytest.raises(InvalidInput, match="one torque and one spread for each speed"):
         TorqueLibrary(SPEEDS, torque, torque)
+
+
+def test_a_library_that_was_saved_is_the_same_when_loaded(
+    learned: TorqueLibrary, tmp_path: Path
+) -> None:
+    learned.save(tmp_path / "skill.npz")
+    again = TorqueLibrary.load(tmp_path / "skill.npz")
+    for name in ("speeds", "torque", "spread"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(learned, name))
+    assert [path.name for path in tmp_path.iterdir()] == ["skill.npz"]
+
+
+def test_a_damaged_library_says_so(learned: TorqueLibrary, tmp_path: Path) -> None:
+    path = tmp_path / "skill.npz"
+    with pytest.raises(FileProblem, match="missing"):
+        TorqueLibrary.load(path)
+    learned.save(path)
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(FileProblem, match="damaged"):
+        TorqueLibrary.load(path)
+    np.savez(path, schema=np.array(1), speeds=np.array([0.0, 0.1]))
+    with pytest.raises(FileProblem, match="damaged"):
+        TorqueLibrary.load(path)
+
+
+def test_a_pickle_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "skill.npz"
+    with path.open("wb") as file:
+        np.savez(file, schema=np.array(1), speeds=np.array([None, {}], dtype=object))
+    with pytest.raises(FileProblem, match="damaged"):
+        TorqueLibrary.load(path)
+
+
+def test_a_speed_left_out_is_interpolated_between_the_others(learned: TorqueLibrary) -> None:
+    rest = learned.without(0.0)
+    np.testing.assert_array_equal(rest.speeds, [-0.1, 0.3])
+    expected = 0.75 * learned.torque[0] + 0.25 * learned.torque[2]
+    np.testing.assert_allclose(rest.at(np.array([0.0]))[0], expected)

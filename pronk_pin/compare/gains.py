@@ -1,0 +1,139 @@
+"""Does learning permit smaller feedback gains, as the paper claims (section IV)?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from .._typing import Array
+from ..control import ControllerSpec, Gains
+from ..errors import InvalidInput
+from ..gait import Gait, load_library
+from ..robot import JOINTS, Robot, load_robot
+from .metrics import STEADY_STRIDES
+from .scenario import Scenario
+from .simulate import Schedule, Simulation
+
+SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
+"""Feedback gains of the sweep, over the controller's own."""
+_PRACTICE, _LEARNING, _REPLAY = 4.0, 16.0, 16.0
+
+
+def sweep_gains(
+    spec: ControllerSpec,
+    speeds: Sequence[float],
+    scenario: Scenario,
+    *,
+    robot: str = "a1",
+    shares: Sequence[float] = SHARES,
+) -> pd.DataFrame:
+    """Practise once with full gains, then replay what was learned with smaller ones.
+
+    Args:
+        spec: A controller that learns.
+        speeds: Desired speeds [m/s].
+        scenario: The world.
+        robot: Short name of the robot.
+        shares: Feedback gains, over the controller's own.
+
+    Returns:
+        A row for each share, with and without what was learned: `share`, `learned`, mean peak
+        stance errors `thigh` and `calf` [rad] over speeds and the last strides, robots `upright`
+        and how many `robots` there are.
+    """
+    if spec.law is None:
+        raise InvalidInput(f"controller '{spec.name}' does not learn; choose one that does")
+    machine, library = load_robot(robot), load_library(robot)
+    gaits = [library.at(speed) for speed in speeds]
+    practice = simulate(machine, gaits, spec, scenario, Schedule(0.5, _PRACTICE, _LEARNING))
+    learned = practice.controller.feedforward
+    rows = []
+    for share in shares:
+        for feedforward in (None, learned):
+            gains = Gains(_scaled(spec.gains.kp, share), _scaled(spec.gains.kd, share))
+            replay = replace(spec, law=None, flight_law=None, gains=gains)
+            schedule = Schedule(0.5, _REPLAY, 0.0)
+            done = simulate(machine, gaits, replay, scenario, schedule, feedforward)
+            rows.append({"share": share, "learned": feedforward is not None, **judged(done)})
+    return pd.DataFrame(rows)
+
+
+def describe_gains(table: pd.DataFrame) -> str:
+    """The sweep as a table, and the answer computed from it, as text for a terminal."""
+    lines = [
+        "          peak without learning [rad]     peak with what was learned [rad]",
+        "gains       thigh    calf   upright         thigh    calf   upright",
+    ]
+    for share, pair in table.groupby("share", sort=False):
+        cells = "".join(
+            f"    {row.thigh:7.4f} {row.calf:7.4f}  {row.upright:2d} of {row.robots:2d}    "
+            for row in pair.sort_values("learned").itertuples()
+        )
+        lines.append(f"{float(str(share)):5.0%}  {cells.rstrip()}")
+    return "\n".join([*lines, "", _answer(table)])
+
+
+def _answer(table: pd.DataFrame) -> str:
+    full = table[(table["share"] == table["share"].max()) & ~table["learned"]].iloc[0]
+    good = table[
+        table["learned"]
+        & (table["thigh"] <= full["thigh"])
+        & (table["calf"] <= full["calf"])
+        & (table["upright"] == table["robots"])
+    ]
+    smaller = good[good["share"] < full["share"]]
+    if smaller.empty:
+        return "No: with smaller gains, what was learned does not track as well as full gains did."
+    least = smaller.loc[smaller["share"].idxmin()]
+    plain = table[(table["share"] == least["share"]) & ~table["learned"]].iloc[0]
+    return (
+        f"Yes: down to {least['share']:.0%} of the gains, what was learned tracks at least as well "
+        f"as full\ngains without it ({least['calf']:.3f} against {full['calf']:.3f} rad in the "
+        f"calf; {plain['calf']:.3f} with those gains alone)."
+    )
+
+
+def simulate(
+    robot: Robot,
+    gaits: Sequence[Gait],
+    spec: ControllerSpec,
+    scenario: Scenario,
+    schedule: Schedule,
+    feedforward: Array | None = None,
+) -> Simulation:
+    """A simulation of a controller that has been run, with one seed."""
+    simulation = Simulation(
+        robot,
+        gaits,
+        spec,
+        scenario,
+        schedule=schedule,
+        rng=np.random.default_rng(0),
+        feedforward=feedforward,
+    )
+    simulation.run()
+    return simulation
+
+
+def judged(simulation: Simulation) -> dict[str, float | int]:
+    """Mean peaks over the robots' last strides, and how many robots stayed up."""
+    log = simulation.strides
+    steady = [
+        log.peak_error[k, max(0, count - STEADY_STRIDES) : count].mean(axis=0)
+        for k, count in enumerate(log.count)
+    ]
+    peaks = np.mean(steady, axis=0).reshape(-1, len(JOINTS)).mean(axis=0)
+    upright = simulation.upright
+    return {
+        **{joint: float(peak) for joint, peak in zip(JOINTS, peaks, strict=True)},
+        "upright": int(upright.sum()),
+        "robots": len(upright),
+    }
+
+
+def _scaled(gains: tuple[float, float, float], share: float) -> tuple[float, float, float]:
+    hip, thigh, calf = gains
+    return share * hip, share * thigh, share * calf

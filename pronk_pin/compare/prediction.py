@@ -1,0 +1,206 @@
+"""What the analysis of a learning law predicts for a practice, beside what was measured."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from .._typing import Array
+from ..control import (
+    ControllerSpec,
+    LearningLaw,
+    LiftedModel,
+    ModelBasedILC,
+    Settings,
+    StrideRecord,
+    lifted_model,
+    phase_grid,
+)
+from ..control.analysis import Analysis, analyze, predict
+from ..control.guided import Rotors
+from ..errors import InvalidInput
+from ..gait import load_library
+from ..robot import JOINTS, load_robot
+from .scenario import Scenario
+from .simulate import Schedule, Simulation
+from .strides import to_dataset
+
+_PRACTICE = 6.0
+_WIDTH = 96
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A practice as predicted and as measured.
+
+    Attributes:
+        controller: Short name of the controller.
+        speed: Desired speed [m/s].
+        analysis: What linear algebra says of the law along the gait.
+        predicted: RMS of the stance error by the model, of hip, thigh and calf [rad], shape
+            (strides + 1, 3); the first is the stride before learning.
+        measured: The same as it happened.
+    """
+
+    controller: str
+    speed: float
+    analysis: Analysis
+    predicted: Array
+    measured: Array
+
+    @property
+    def factor(self) -> Array:
+        """By which factor prediction and measurement differ, thigh and calf together, a stride."""
+        predicted, measured = (
+            np.sqrt((values[:, 1:] ** 2).mean(axis=1)) for values in (self.predicted, self.measured)
+        )
+        return np.asarray(np.maximum(predicted / measured, measured / predicted))
+
+
+def practise(
+    spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario, *, robot: str, strides: int
+) -> xr.Dataset:
+    """A short practice in simulation, with the law of the stance only.
+
+    Raises:
+        InvalidInput: The controller does not learn in stance.
+    """
+    _law(spec)
+    library = load_library(robot)
+    gaits = [library.at(speed) for speed in speeds]
+    longest = max(gait.duration for gait in gaits)
+    simulation = Simulation(
+        load_robot(robot),
+        gaits,
+        replace(spec, flight_law=None),
+        scenario,
+        schedule=Schedule(practice=_PRACTICE, learning=1.25 * (strides + 2) * longest),
+        rng=np.random.default_rng(0),
+    )
+    return to_dataset(simulation.run(), load_robot(robot), gaits, attributes={"robot": robot})
+
+
+def compare_prediction(
+    spec: ControllerSpec, strides: xr.Dataset, speed: float, scenario: Scenario, *, number: int
+) -> Prediction:
+    """Predict a practice from the last stride before it, and lay the measured strides beside.
+
+    The model has the rotors and the viscous friction of the scenario, as data sheets tell them;
+    a law that needs a model has one of its own without them, as on the robot.
+
+    Args:
+        spec: The controller that practised.
+        strides: Its strides, see `compare.strides`.
+        speed: Which robot [m/s].
+        scenario: The world that they were made in.
+        number: Strides of learning; fewer if there are fewer.
+
+    Raises:
+        InvalidInput: The controller does not learn, or there are no strides before its learning.
+    """
+    law = _law(spec)
+    robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
+    settings = Settings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
+    model = lifted_model(robot, gait, settings, rotors=Rotors(scenario.armature, scenario.damping))
+    if isinstance(law, ModelBasedILC):
+        law = law.along([lifted_model(robot, gait, settings)])
+    mine = strides.sel(speed=speed, method="nearest").sel(part="stance")
+    made = int(mine["count"])
+    first = int(np.argmax(mine["learning"].to_numpy()[:made] == 1))
+    if first == 0:
+        raise InvalidInput("no strides before the learning; give the practice some seconds")
+    error = mine["error"].to_numpy()[first - 1 : min(made, first + number)]
+    begin = _record(mine.isel(stride=first - 1), model)
+    predicted = predict(law, model, begin, len(error) - 1)
+    predicted = predicted[:, :: (predicted.shape[1] - 1) // (error.shape[1] - 1)]
+    return Prediction(
+        spec.name, speed, analyze(law, model, begin), _by_joint(predicted), _by_joint(error)
+    )
+
+
+def describe_prediction(prediction: Prediction) -> str:
+    """The analysis and the comparison in words, as text for a terminal."""
+    found = prediction.analysis
+    quasi = found.quasi_static
+    stable = "stable" if found.radius < 1.0 else "unstable"
+    left = 1.0 - quasi.left
+    lines = [
+        f"{prediction.controller} at {prediction.speed:g} m/s",
+        f"  spectral radius           {found.radius:8.3f}  ({stable})",
+        f"  with every stride reset   {found.stride_radius:8.3f}",
+        f"  largest singular value    {found.largest_gain:8.3f}",
+        f"  transient growth          {found.transient:8.3f}",
+        "  error left in the limit   "
+        + ", ".join(
+            f"{joint} {_percent(value)}" for joint, value in zip(JOINTS, found.limit, strict=True)
+        ),
+        "  radius with other motors  "
+        + ", ".join(
+            f"x{factor:g} {radius:.3f}" for factor, radius in found.with_gain_error.items()
+        ),
+        "  radius with delay         "
+        + ", ".join(f"{delay} samples {radius:.3f}" for delay, radius in found.with_delay.items()),
+        "",
+        textwrap.fill(_in_words(quasi.gain, quasi.memory, quasi.multiplier, left), _WIDTH),
+        "",
+        "  stride   predicted [rad]     measured [rad]     factor",
+        "             thigh    calf      thigh    calf",
+    ]
+    for k, (p, m, factor) in enumerate(
+        zip(prediction.predicted, prediction.measured, prediction.factor, strict=True)
+    ):
+        lines.append(
+            f"  {k:6d}   {p[1]:7.4f} {p[2]:7.4f}    {m[1]:7.4f} {m[2]:7.4f}    {factor:7.2f}"
+        )
+    worst = int(np.argmax(prediction.factor))
+    lines.append(f"\nworst factor {prediction.factor[worst]:.2f}, in stride {worst}")
+    return "\n".join(lines)
+
+
+def _law(spec: ControllerSpec) -> LearningLaw:
+    if spec.law is None:
+        raise InvalidInput(
+            f"controller '{spec.name}' does not learn in stance; choose one with a law, as 'ilc'"
+        )
+    return spec.law
+
+
+def _in_words(gain: float, memory: float, multiplier: float, less: float) -> str:
+    text = (
+        f"On a joint that moves slowly the law adds {gain:.2f} times the feedback torque and keeps "
+        f"{memory:.2f} of its memory, so that a stride multiplies the error's distance from its "
+        f"limit by {memory:.2f} (1 - {gain:.2f}) = {multiplier:.2f}"
+    )
+    if abs(multiplier) > 1.0 - 1e-3:
+        return text + ": it does not converge."
+    return text + f", and {less:.0%} of the error is gone in the limit."
+
+
+def _record(stride: xr.Dataset, model: LiftedModel) -> StrideRecord:
+    """The record of a stored stride, on the grid of the control."""
+    curves = {
+        name: stride[name].transpose("phase", "joint").interp(phase=phase_grid()).to_numpy()[None]
+        for name in ("error", "feedback", "feedforward")
+    }
+    gains = model.gains
+    rate = (curves["feedback"] - gains.proportional * curves["error"]) / gains.derivative
+    return StrideRecord.of(
+        curves["error"].astype(float),
+        rate.astype(float),
+        curves["feedback"].astype(float),
+        curves["feedforward"].astype(float),
+    )
+
+
+def _by_joint(error: Array) -> Array:
+    """RMS over the phase and the legs: (strides, samples, 12) becomes (strides, 3)."""
+    legs = error.reshape(*error.shape[:2], -1, len(JOINTS)).astype(float)
+    return np.asarray(np.sqrt((legs**2).mean(axis=(1, 2))))
+
+
+def _percent(value: float) -> str:
+    return f"{value:.1%}" if np.isfinite(value) else "-"

@@ -1,0 +1,33 @@
+"""Named experiments: questions that are asked again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .._state import known_name
+from .experiment import Experiment
+from .mismatch import MISMATCHES
+
+SUITES: Mapping[str, Mapping[str, Any]] = {
+    "default": {},
+    "mismatch": {"scenarios": MISMATCHES},
+    "control": {
+        "speeds": (-0.3, 0.0, 0.3, 0.6),
+        "controllers": ("pd", "ilc", "ilc-zero", "model"),
+        "seeds": tuple(range(5)),
+    },
+    "paper": {"controllers": ("pd", "ilc", "ilc-paper"), "seeds": tuple(range(5))},
+}
+"""What each differs in from `Experiment()`: the paper's speeds under five controllers; the same in
+every world of the list of mismatches; the control arm, which must show nothing; Table I with
+intervals over seeds, and with the paper's own learning law."""
+
+
+def load_suite(name: str) -> Experiment:
+    """The experiment of that name.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    return Experiment(**SUITES[known_name("suite", name, SUITES)])

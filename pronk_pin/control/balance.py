@@ -1,0 +1,161 @@
+"""Keeping a trunk up that is free to turn: what is added to the tapes at every tick.
+
+On the ground a moment on the trunk is spread over the contact forces within their friction cones,
+and the legs' transposed Jacobians turn what the forces change into torques. In the air the feet are
+moved, see `FootPlacement`. None of it is feedforward or tracking error, so none of it is learned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .._typing import Array, IntArray
+from ..conventions import rotation_matrix
+from ..gait import Gait
+from ..inverse_dynamics.distribution import distribute_wrench
+from ..kinematics.legs import contact_points, leg_geometry
+from ..robot import JOINTS, Robot
+from .attitude import AttitudeRegulator, attitude_angle, attitude_error, pitched
+from .placement import FootPlacement, placed
+from .record import PARTS
+from .tape import Gains
+
+
+@dataclass(frozen=True)
+class BalanceSpec:
+    """How a trunk that is free to turn is kept up.
+
+    Attributes:
+        attitude: On the ground.
+        placement: In the air.
+    """
+
+    attitude: AttitudeRegulator = field(default_factory=AttitudeRegulator)
+    placement: FootPlacement = field(default_factory=FootPlacement)
+
+
+class Balance:
+    """Runs one `BalanceSpec` on n robots, each with its own gait.
+
+    Args:
+        robot: The robot.
+        gaits: The gait of each of the n robots.
+        spec: How they are kept up.
+        gains: Feedback gains that pull the feet to their places in flight.
+        ticks: Length of the longest tape.
+        timestep: Time step of the control [s].
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gaits: Sequence[Gait],
+        spec: BalanceSpec,
+        *,
+        gains: Gains,
+        ticks: int,
+        timestep: float,
+    ) -> None:
+        self._spec, self._gains, self._radius = spec, gains, robot.foot_radius
+        self._geometry = leg_geometry(robot)
+        duration = np.array([[getattr(g, part).duration for part in PARTS] for g in gaits])
+        self._s = np.minimum(np.arange(ticks) * timestep / duration[..., None], 1.0)
+        pitch, rate = np.zeros((2, len(gaits), len(PARTS), ticks))
+        for k, gait in enumerate(gaits):
+            for p, part in enumerate(PARTS):
+                base, speed = getattr(gait, part).base_reference(self._s[k, p])
+                pitch[k, p] = base[:, 2]
+                rate[k, p] = np.where(self._s[k, p] < 1.0, speed[:, 2], 0.0)
+        self._reference, self._rate = pitched(pitch), rate
+        force = [
+            gait.stance.motion(robot, s).lam for gait, s in zip(gaits, self._s[:, 0], strict=True)
+        ]
+        self._force = np.stack(force)  # (n, ticks, 4, 3)
+        self._share = spec.placement.share(self._s[:, 1])
+        self._aside = np.zeros(len(gaits))
+
+    def lift_off(self, rows: IntArray, sideways: Array) -> None:
+        """Robots leave the ground with speeds (m,) sideways [m/s], in the world."""
+        self._aside[rows] = self._spec.placement.aside(sideways)
+
+    def torque(
+        self,
+        part: int,
+        rows: IntArray,
+        tick: int,
+        trunk: tuple[Array, Array],
+        joints: Array,
+        reference: Array,
+    ) -> Array:
+        """What to add to the tapes' torques at one tick [N m], shape (m, 12).
+
+        Args:
+            part: Part of the stride, an index into `PARTS`.
+            rows: Which robots.
+            tick: Tick of their tapes.
+            trunk: What they believe of their trunks, in Pinocchio's layout: position and
+                quaternion (m, 7), velocity (m, 6).
+            joints: Their joint angles [rad], shape (m, 12).
+            reference: The tapes' joint angles [rad], shape (m, 12).
+        """
+        rotation, wanted = rotation_matrix(trunk[0][:, 3:7]), self._reference[rows, part, tick]
+        if part == 0:
+            added = self._ground(rows, tick, rotation, wanted, trunk[1][:, 3:6], joints)
+        else:
+            added = self._air(rows, tick, rotation, wanted, reference)
+        added[~np.isfinite(added)] = 0.0  # a sensor that fails must not reach the motors
+        return added
+
+    def tilt(self, part: int, rows: IntArray, pose: Array, length: IntArray) -> Array:
+        """Largest angle between trunk and gait in a part of the stride [rad], shape (m,).
+
+        Args:
+            part: Part of the stride.
+            rows: Which robots.
+            pose: Trunk at each tick, position and quaternion, shape (m, ticks, 7).
+            length: Ticks that the part lasted, shape (m,).
+        """
+        ticks = pose.shape[1]
+        angle = attitude_angle(rotation_matrix(pose[..., 3:7]), self._reference[rows, part, :ticks])
+        return np.asarray(np.where(np.arange(ticks) < length[:, None], angle, 0.0).max(axis=1))
+
+    def _ground(
+        self, rows: IntArray, tick: int, rotation: Array, wanted: Array, spin: Array, joints: Array
+    ) -> Array:
+        regulator = self._spec.attitude
+        added = np.zeros_like(joints)
+        sound = np.isfinite(rotation.sum(axis=(1, 2)) + spin.sum(axis=1) + joints.sum(axis=1))
+        asked = np.flatnonzero(sound & (self._s[rows, 0, tick] < regulator.until))
+        if asked.size == 0:
+            return added
+        rows, rotation, wanted = rows[asked], rotation[asked], wanted[asked]
+        joints = joints[asked]
+        rate = -np.einsum("nij,nj->ni", rotation, spin[asked])
+        rate[:, 1] += self._rate[rows, 0, tick]
+        moment = regulator.moment(attitude_error(rotation, wanted), rate)
+        points = contact_points(self._geometry, _by_leg(joints), -self._radius * rotation[:, 2])
+        arms = np.einsum("nij,nlj->nli", rotation, points.position)
+        nominal = self._force[rows, tick]
+        wrench = np.concatenate([np.zeros_like(moment), moment], axis=1)
+        forces = distribute_wrench(arms, wrench, nominal, friction=regulator.friction)
+        change = (forces - nominal) @ rotation  # in the trunk's axes
+        torque = -np.einsum("nlij,nli->nlj", points.jacobian, change)
+        added[asked] = torque.reshape(joints.shape)
+        return added
+
+    def _air(
+        self, rows: IntArray, tick: int, rotation: Array, wanted: Array, reference: Array
+    ) -> Array:
+        turn = np.swapaxes(rotation, -1, -2) @ wanted
+        offset = self._aside[rows, None] * rotation[:, 1, :]  # the world's y in the trunk's axes
+        share = self._share[rows, tick]
+        moved = placed(self._geometry, _by_leg(reference), turn, offset, share)
+        change = moved.reshape(reference.shape) - reference
+        return np.asarray(self._gains.proportional * change)
+
+
+def _by_leg(joints: Array) -> Array:
+    return joints.reshape(len(joints), -1, len(JOINTS))

@@ -1,0 +1,132 @@
+"""Figures over many worlds: who has which error where, and when practice beats the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from ..compare.practice import RIVAL, Practice
+from ..compare.tables import SHOWN
+from .style import (
+    SEQUENTIAL,
+    TWO_COLUMNS,
+    in_order,
+    legend_below,
+    look,
+    new_figure,
+    styled,
+)
+
+_STRIDES = 40
+"""Strides of learning that are shown."""
+
+_COLUMNS = 3
+
+
+@styled
+def heat_map(table: pd.DataFrame) -> Figure:
+    """Mean peak error of every controller in every world, one panel a joint.
+
+    Args:
+        table: `compare.tables.answer`. Where robots fell, their number stands below the error.
+    """
+    scenarios = list(dict.fromkeys(table.index.get_level_values("scenario")))
+    controllers = in_order(table.index.get_level_values("controller"))
+    figure = new_figure(TWO_COLUMNS, 1.1 + 0.27 * len(scenarios))
+    panels = figure.subplots(1, len(SHOWN), sharey=True)
+    errors = table[list(SHOWN)].to_numpy(dtype=float)
+    norm = LogNorm(np.nanmin(errors), np.nanmax(errors))
+    for axes, joint in zip(panels, SHOWN, strict=True):
+        values = table[joint].unstack("controller").reindex(index=scenarios, columns=controllers)
+        image = axes.imshow(values, cmap=SEQUENTIAL, norm=norm, aspect="auto")
+        _write_cells(axes, table, values, norm)
+        axes.set_xticks(
+            range(len(controllers)), [look(name).label for name in controllers], rotation=25
+        )
+        for label in axes.get_xticklabels():
+            label.set_horizontalalignment("right")
+        axes.set_yticks(range(len(scenarios)), scenarios)
+        axes.grid(visible=False)
+        axes.set_title(joint)
+    bar = figure.colorbar(image, ax=panels, shrink=0.9)
+    bar.set_label("mean peak stance error [rad]")
+    return figure
+
+
+def _write_cells(axes: Axes, table: pd.DataFrame, values: pd.DataFrame, norm: LogNorm) -> None:
+    """The error of each cell in milliradians, and how many fell."""
+    for (row, column), value in np.ndenumerate(values.to_numpy(dtype=float)):
+        key = (values.index[row], values.columns[column])
+        if not np.isfinite(value):
+            text = "all\nfell" if key in table.index else ""
+            axes.text(column, row, text, ha="center", va="center", fontsize=6)
+            continue
+        fallen = int(table.loc[key, "robots"] - table.loc[key, "upright"])
+        text = f"{1e3 * value:.0f}" + (f"\n{fallen} fell" if fallen else "")
+        light = np.dot(colormaps[SEQUENTIAL](float(norm(value)))[:3], (0.3, 0.6, 0.1)) > 0.5
+        color = "black" if light else "white"
+        axes.text(column, row, text, ha="center", va="center", fontsize=6, color=color)
+
+
+@styled
+def practice_curves(practised: Mapping[str, list[Practice]], *, joint: str) -> Figure:
+    """Peak error over the strides of learning in every world, with the model's level as a line.
+
+    Means over the robots that did not fall; the band is from the first to the third quartile.
+
+    Args:
+        practised: The simulations of each world.
+        joint: "calf" or "thigh".
+    """
+    rows = -(-len(practised) // _COLUMNS)
+    columns = min(_COLUMNS, len(practised))
+    figure = new_figure(TWO_COLUMNS, 0.5 + 1.45 * rows)
+    panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    for axes in panels.ravel()[len(practised) :]:
+        axes.set_visible(False)
+    handles: dict[str, object] = {}
+    for axes, (scenario, simulations) in zip(panels.ravel(), practised.items(), strict=False):
+        for controller in in_order(str(one.settings["controller"]) for one in simulations):
+            mine = [one for one in simulations if one.settings["controller"] == controller]
+            line = _draw(axes, mine, SHOWN.index(joint), controller)
+            if line is not None:
+                handles[look(controller).label] = line
+        axes.set_title(scenario)
+        axes.set_yscale("log")
+    for axes in panels[-1]:
+        axes.set_xlabel("strides of learning")
+    for axes in panels[:, 0]:
+        axes.set_ylabel(f"{joint}: peak [rad]")
+    legend_below(figure, handles.values(), handles)
+    return figure
+
+
+def _draw(axes: Axes, simulations: list[Practice], joint: int, controller: str) -> object:
+    """One controller: a curve if it learns, a level if it is PD or the model."""
+    style = look(controller)
+    upright = [one.upright == 1 for one in simulations]
+    curves = [
+        peaks[:_STRIDES, joint]
+        for one, up in zip(simulations, upright, strict=True)
+        for peaks, stands in zip(one.learning, up, strict=True)
+        if stands and len(peaks)
+    ]
+    if curves:
+        length = min(map(len, curves))
+        values = np.array([curve[:length] for curve in curves])
+        k = np.arange(1, length + 1)
+        low, high = np.quantile(values, [0.25, 0.75], axis=0)
+        axes.fill_between(k, low, high, color=style.color, alpha=0.2, lw=0)
+        return axes.plot(k, values.mean(axis=0), **style.curve)[0]
+    if controller not in ("pd", RIVAL):
+        return None
+    levels = np.concatenate(
+        [one.level[up, joint] for one, up in zip(simulations, upright, strict=True)]
+    )
+    return axes.axhline(levels.mean(), **style.curve) if levels.size else None
