@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
 from .._typing import Array, BoolArray
 from ..compare import Results
@@ -104,8 +105,11 @@ class _Reader:
     def scene(self, choice: Choice) -> Scene:
         """The scene of a choice."""
         speed, scenario = float(choice[SPEED]), choice[SCENARIO]
-        robot_name = self.results.experiment.robot
-        robot, gait = load_robot(robot_name), load_library(robot_name).at(speed)
+        experiment = self.results.experiment
+        robot, base = load_robot(experiment.robot), experiment.base
+        # As the experiment does: of a trunk that may turn, the gaits that let it pitch.
+        library = load_library(robot.name, base=None if base == "locked" else "sagittal")
+        gait = library.at(speed)
         mine = self._strides(choice[CONTROLLER], scenario, speed)
         shown = _cut(mine, choice[STRIDES])
         tracks = [*_pair(robot, gait, shown, look(choice[CONTROLLER]).label)]
@@ -280,7 +284,9 @@ def _measured(robot: Robot, strides: xr.Dataset, name: str) -> Track:
     return Track(
         name,
         samples.times,
-        _configurations(robot, samples.curve(strides, "base"), joints),
+        _configurations(
+            robot, samples.curve(strides, "base"), joints, samples.curve(strides, "attitude")
+        ),
         error=error,
         torque=np.clip(torque, -robot.tau_max, robot.tau_max),
         forces=samples.forces(strides),
@@ -297,14 +303,23 @@ def _planned(robot: Robot, strides: xr.Dataset, gait: Gait, name: str) -> Track:
     samples = _Samples.of(strides)
     place = strides["base"].isel(part=0, phase=0, axis=0).to_numpy()  # (strides,)
     s = strides["phase"].to_numpy()
-    base = np.stack([phase.base_reference(s)[0][:, :2] for phase in (gait.stance, gait.flight)])
-    moved = np.repeat(base[None], len(place), axis=0)  # (strides, 2, samples, 2)
+    base = np.stack([phase.base_reference(s)[0] for phase in (gait.stance, gait.flight)])
+    moved = np.repeat(base[None], len(place), axis=0)  # (strides, 2, samples, 3): x, z, pitch
     moved[..., 0] += place[:, None, None]
-    q = _configurations(robot, moved[samples.within], samples.curve(strides, "reference"))
+    x_z_pitch = moved[samples.within]
+    attitude = np.zeros_like(x_z_pitch)
+    attitude[:, 1] = x_z_pitch[:, 2]
+    joints = samples.curve(strides, "reference")
+    q = _configurations(robot, x_z_pitch[:, :2], joints, attitude)
     return Track(f"reference of {name}", samples.times, q, ghost=True)
 
 
-def _configurations(robot: Robot, base: Array, joints: Array) -> Array:
-    """Configurations (n, 19) from the trunk's x and z (n, 2) and the joints (n, 12)."""
+def _configurations(robot: Robot, base: Array, joints: Array, attitude: Array) -> Array:
+    """Configurations (n, 19) from the trunk's x and z, its roll, pitch and heading, and the joints.
+
+    Where the trunk drifts sideways is not kept, and is left out.
+    """
     xyz = np.column_stack([base[:, 0], np.zeros(len(base)), base[:, 1]])
-    return robot.q_from_base(xyz, joints)
+    q = robot.q_from_base(xyz, joints)
+    q[:, 3:7] = Rotation.from_euler("ZYX", attitude[:, ::-1]).as_quat()
+    return q

@@ -71,6 +71,26 @@ def test_the_last_strides_have_forces_that_carry_the_robot(results: Results) -> 
     assert np.abs(track.forces[apex]).max() < 0.05 * weight
 
 
+def test_a_trunk_that_pitches_is_shown_pitching(tmp_path: Path) -> None:
+    experiment = Experiment(
+        speeds=(0.5,),
+        controllers=("pd",),
+        base="sagittal",
+        schedule=Schedule(practice=3.0, learning=0.5),
+    )
+    results = run_experiment(experiment, tmp_path / "pitching", workers=1, progress=False)
+    strides = results.strides(results.find(controller="pd")).isel(speed=0)
+    shown = practice_programme(results).scene().tracks[0]
+    first = shown.marks[0].stride
+    stance = strides.isel(stride=first).sel(part="stance", phase=0.5)
+    t = 0.5 * float(strides["planned_duration"].sel(part="stance"))
+    q = shown.at(np.array([t]))["q"][0]
+    pitch = 2.0 * np.arctan2(q[4], q[6])
+    measured = float(stance["attitude"].sel(rotation="pitch"))
+    assert abs(measured) > 1e-3
+    assert pitch == pytest.approx(measured, abs=1e-6)
+
+
 def test_strides_before_learning_run_beside_those_with_it(results: Results) -> None:
     scene = practice_programme(results, beside="before learning").scene()
     first, _, second, _ = scene.tracks
