@@ -40,7 +40,7 @@ def test_compare_writes_everything_it_names(result: Path) -> None:
     names = {path.name for path in result.iterdir()}
     assert names == {
         *("config.json", "provenance.json", "summary.csv", "strides"),
-        *("report.html", "replay.html"),
+        *("report.html", "report.md", "figures", "replay.html"),
     }
     assert {path.name for path in (result / "strides").iterdir()} == {
         "pd_nominal_0.nc",

@@ -21,7 +21,7 @@ EXPERIMENT = Experiment(
     speeds=(0.0, 0.4),
     controllers=("pd", "ilc", "model", "ilc-zero"),
     scenarios=("nominal", "payload"),
-    schedule=Schedule(startup=0.2, practice=2.0, learning=4.0),
+    schedule=Schedule(startup=0.2, practice=6.0, learning=4.0),
 )
 
 
