@@ -1,8 +1,8 @@
 """One look for every figure: colours, line styles, sizes, formats.
 
-Colours are those of Okabe and Ito, which readers with any colour vision tell apart; controllers
-differ in line style and marker too, so that a black and white print can be read. Sizes are those
-of an IEEE column and page; letters are 8 points in print.
+Colours are those of Okabe and Ito and a few more, which readers with any colour vision tell apart;
+controllers differ in line style and marker too, so that a black and white print can be read. Sizes
+are those of an IEEE column and page; letters are 8 points in print.
 """
 
 from __future__ import annotations
@@ -29,8 +29,10 @@ PALETTE = {
     "vermilion": "#D55E00",
     "purple": "#CC79A7",
     "grey": "#737373",
+    "brown": "#5C3A21",
+    "indigo": "#4B0082",
 }
-"""The colours by name; yellow is too light for lines on white."""
+"""The colours by name; yellow is too light for lines on white. The last three are not of theirs."""
 
 REFERENCE, ACCENT = PALETTE["grey"], PALETTE["vermilion"]
 """Colours of references, and of events and limits."""
@@ -76,8 +78,8 @@ LOOKS = {
     "ilc": Look("ILC", PALETTE["blue"], "-", "o"),
     "model+ilc": Look("ILC seeded by the model", PALETTE["green"], _DASHED, "D"),
     "ilc-paper": Look("ILC, the paper's law", PALETTE["vermilion"], _DASH_DOT, "v"),
-    "identified": Look("PD + identified model", PALETTE["grey"], _DASHED, "P"),
-    "identified+gait": Look("PD + identified model, gaits again", PALETTE["purple"], "-", "*"),
+    "identified": Look("PD + identified model", PALETTE["brown"], _DASHED, "P"),
+    "identified+gait": Look("PD + identified model, gaits again", PALETTE["indigo"], "-", "*"),
     "paper": Look("paper", PALETTE["purple"], "", "+"),
 }
 """Looks by controller, in the order of legends; "paper" are the paper's own numbers."""

@@ -415,7 +415,7 @@ class Player {
 
   show(film) {
     this.figures.forEach((figure) => figure.remove());
-    const first = !this.film;
+    const before = this.film ? this.solid : 0;
     this.film = film;
     this.duration = (film.view.rows - 1) / film.fps;
     this.figures = film.tracks.map((track) => new Figure(this.robot, track, film, this.world));
@@ -436,20 +436,20 @@ class Player {
     $("cones").parentElement.hidden = !holds("forces") || !film.friction;
     $("plots").hidden = !holds("error") && !holds("torque");
     this.legend();
-    if (first) this.look();
+    if (this.solid !== before) this.look();  // the rest of the time the camera is the reader's
     this.fit();
     this.seek(this.time);
   }
 
   // From the robots' right front; MeshCat's camera has y up.
   look() {
-    const solid = this.film.tracks.filter((track) => !track.ghost).length;
-    const far = 1 + 0.45 * (solid - 1);
+    const far = 1 + 0.45 * Math.max(this.solid - 1, 0);
     this.viewer.camera.position.set(0.55 * far, 0.45 * far, 0.85 * far);
     this.viewer.camera.fov = 50;
     this.viewer.controls.target.set(0, 0.2, 0);
   }
 
+  get solid() { return this.film.tracks.filter((track) => !track.ghost).length; }
   get leader() { return this.film.tracks.find((track) => !track.ghost) || this.film.tracks[0]; }
 
   fillStrides() {
@@ -588,7 +588,7 @@ class Player {
   // One frame of the screen; the clock is the wall's, so that a slow screen leaves frames out.
   tick(now) {
     requestAnimationFrame((next) => this.tick(next));
-    const elapsed = Math.min((now - (this.last || now)) / 1000, 0.5);
+    const elapsed = (now - (this.last || now)) / 1000;
     this.last = now;
     if (!this.film) return;
     if (this.playing && this.duration > 0) {
