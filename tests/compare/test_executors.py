@@ -87,7 +87,7 @@ def kill_a_worker(after: float) -> threading.Thread:
             workers = multiprocessing.active_children()
             if workers:
                 time.sleep(after)
-                os.kill(workers[0].pid or 0, signal.SIGKILL)
+                workers[0].kill()
                 return
             time.sleep(0.05)
 
