@@ -185,7 +185,7 @@ def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixt
         (["compare", "--robot", "spot"], "unknown robot 'spot'; choose one of: a1"),
         (["compare", "--speeds", "3"], "outside the gait library, which covers -0.5 to 0.8 m/s"),
         (["compare", "--speeds", "0.1", "0.1"], "speeds must name at least one, and none of them"),
-        (["compare", "--base", "free"], "base 'free' is not available"),
+        (["compare", "--base", "floating"], "unknown base 'floating'; choose one of: locked"),
         (["compare", "--workers", "0"], "at least one is needed"),
         (["compare", "--schedule.learning", "-1"], "finite and not negative"),
         (["report", "nowhere"], "not a results folder (no config.json); run 'pronk-pin compare'"),
