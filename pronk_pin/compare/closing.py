@@ -16,7 +16,7 @@ import xarray as xr
 from tqdm import tqdm
 
 from .._typing import Array
-from ..control import ControllerSpec, load_controller
+from ..control import ControllerSpec, Skill, load_controller
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
 from ..gait import Gait, load_library
@@ -88,7 +88,7 @@ def close_loop(
             for name in controllers:
                 spec = load_controller(name)
                 mine = again if spec.mended_gaits else gaits
-                first = _feedforward(spec, explanation, mine, strides)
+                first = _begin(spec, explanation, mine, strides)
                 found = _simulate(
                     explanation, mine, spec, world, schedule, np.random.default_rng(seed), first
                 )
@@ -134,15 +134,16 @@ def _worlds(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> 
     return [own, replace(own, name=f"{own.name} + 3 kg", payload=own.payload + 3.0)]
 
 
-def _feedforward(
+def _begin(
     spec: ControllerSpec, explanation: Explanation, gaits: Sequence[Gait], strides: xr.Dataset
-) -> Array | None:
+) -> Skill:
+    """What a controller begins with."""
     if spec.source == "library":
-        return torque_library(strides).at(np.array([gait.speed for gait in gaits]))
+        return torque_library(strides).skill(np.array([gait.speed for gait in gaits]))
     if spec.source == "none":
-        return None
+        return Skill()
     robot = explanation.mended if spec.source == "identified" else explanation.robot
-    return model_feedforward(robot, gaits)
+    return Skill(model_feedforward(robot, gaits))
 
 
 def _simulate(
@@ -152,7 +153,7 @@ def _simulate(
     world: Scenario,
     schedule: Schedule,
     rng: np.random.Generator,
-    feedforward: Array | None,
+    first: Skill,
 ) -> xr.Dataset:
     learns = any(law is not None for law in spec.laws)
     simulation = Simulation(
@@ -162,7 +163,8 @@ def _simulate(
         world,
         schedule=schedule if learns else replace(schedule, learning=0.0),
         rng=rng,
-        feedforward=feedforward,
+        feedforward=first.feedforward,
+        flight=first.flight,
     )
     return to_dataset(simulation.run(), explanation.robot, gaits, attributes={})
 

@@ -16,8 +16,7 @@ import numpy as np
 import xarray as xr
 
 from .._state import known_name
-from .._typing import Array
-from ..control import BASES, ControllerSpec, TorqueLibrary, load_controller, phase_grid
+from ..control import BASES, ControllerSpec, Skill, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
 from ..gait import SPEEDS, Gait, GaitLibrary, load_library
@@ -34,7 +33,7 @@ LEARNED = ("library", "identified")
 
 DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
 
-PRACTISED = ("count", "learning", "feedforward")
+PRACTISED = ("count", "learning", "feedforward", "flight_reference")
 """What of a practised cell's strides the torque library is made of."""
 
 
@@ -167,6 +166,7 @@ def run_cell(
     if spec.source == "identified":
         mended = explain(_learned(spec, practised)).mended
         gaits = mended_gaits(mended, gaits) if spec.mended_gaits else gaits
+    first = _begin(spec, mended, gaits, practised, cell.base)
     # One stream a seed, the same for every controller: they start from the same postures.
     rng = np.random.default_rng(np.random.SeedSequence(cell.seed))
     simulation = Simulation(
@@ -176,7 +176,8 @@ def run_cell(
         scenario,
         schedule=cell.schedule,
         rng=rng,
-        feedforward=_feedforward(spec, mended, gaits, practised, cell.base),
+        feedforward=first.feedforward,
+        flight=first.flight,
         base=cell.base,
     )
     log = simulation.run(progress)
@@ -190,25 +191,30 @@ def _gaits(robot: str, base: str) -> GaitLibrary:
 
 def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     """The torque library learned in a simulation: means over its steady strides (section III.B)."""
-    torque = steady(strides)["feedforward"].interp(phase=phase_grid(), method="cubic")
+    end = steady(strides)
+    torque = end["feedforward"].interp(phase=phase_grid(), method="cubic")
     torque = torque.transpose("speed", "stride", "part", "phase", "joint")
-    return TorqueLibrary.from_strides(strides["speed"].to_numpy(), torque.to_numpy())
+    flight = end["flight_reference"].transpose("speed", "stride")
+    return TorqueLibrary.from_strides(
+        strides["speed"].to_numpy(), torque.to_numpy(), flight.to_numpy()
+    )
 
 
-def _feedforward(
+def _begin(
     spec: ControllerSpec,
     robot: Robot,
     gaits: Sequence[Gait],
     practised: xr.Dataset | None,
     base: str,
-) -> Array | None:
-    """The feedforward that a controller begins with [N m], (n, 2, samples, 12)."""
+) -> Skill:
+    """What a controller begins with."""
     if spec.source in ("model", "identified"):
-        return model_feedforward(robot, gaits, base=base)
+        return Skill(model_feedforward(robot, gaits, base=base))
     if spec.source == "library":
         learned = torque_library(_learned(spec, practised))
-        return learned.at(np.array([gait.speed for gait in gaits]))
-    return None
+        speeds = np.array([gait.speed for gait in gaits])
+        return learned.skill(speeds)
+    return Skill()
 
 
 def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:

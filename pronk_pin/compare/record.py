@@ -131,7 +131,7 @@ class StrideLog:
 
     SCALARS = (
         *("start", "duration", "stance", "speed", "apex", "upright", "learning", "skipped"),
-        *("heading", "tilt"),
+        *("heading", "tilt", "flight_reference"),
     )
     CURVES = ("error", "feedback", "feedforward")
     TICKS: ClassVar = {
@@ -234,6 +234,7 @@ class StrideLog:
         *,
         tilt: Array | float = 0.0,
         heading: Array | float = 0.0,
+        flight_reference: Array | float = np.nan,
     ) -> None:
         """Strides have ended after so long (m,) [s], with the trunk at x (m,) [m].
 
@@ -245,6 +246,7 @@ class StrideLog:
             skipped: Why nothing is learned from them, see `StrideSelection`.
             tilt: Largest angle between trunk and gait [rad].
             heading: Of the trunk at touchdown [rad].
+            flight_reference: How long the reference of the flight lasted [s].
         """
         at = (rows, self.count[rows])
         self.scalars["duration"][at] = duration
@@ -252,6 +254,7 @@ class StrideLog:
         self.scalars["upright"][at] = upright
         self.scalars["skipped"][at] = skipped
         self.scalars["tilt"][at], self.scalars["heading"][at] = tilt, heading
+        self.scalars["flight_reference"][at] = flight_reference
         self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
 
     def finish(self, upright: BoolArray) -> None:

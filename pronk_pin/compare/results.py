@@ -39,7 +39,7 @@ from .practice import practice, rows_of_beating
 from .provenance import versions
 from .simulate import Schedule
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the layout of a results folder."""
 
 _AGAIN = "run 'pronk-pin compare' to make one"

@@ -104,6 +104,8 @@ class Simulation:
         schedule: What happens when.
         rng: Source of the scatter at the start.
         feedforward: Feedforward to begin with [N m], shape (n, 2, samples, 12).
+        flight: How long the references of the flights last at first [s], shape (n,); by default as
+            the gaits plan them.
         base: How the trunks may move: "locked" to x and z, "sagittal" with pitch, or "free".
         chunked: Let servos play whole tapes, as MuJoCo can where the law is affine between two
             events; otherwise the feedback is computed tick by tick, as it always is where the
@@ -121,6 +123,7 @@ class Simulation:
         schedule: Schedule,
         rng: np.random.Generator,
         feedforward: Array | None = None,
+        flight: Array | None = None,
         base: str = "locked",
         chunked: bool = True,
         threads: int = 0,
@@ -128,7 +131,7 @@ class Simulation:
         n, dt = len(gaits), scenario.timestep
         self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
         self.controller = Controller(
-            robot, gaits, spec, timestep=dt, feedforward=feedforward, base=base
+            robot, gaits, spec, timestep=dt, feedforward=feedforward, flight=flight, base=base
         )
         self._gains, self._tau_max = spec.gains, robot.tau_max
         self._chunked = chunked and scenario.affine and base == "locked"
@@ -232,6 +235,7 @@ class Simulation:
             controller.skipped[rows],
             tilt=tilt,
             heading=heading,
+            flight_reference=controller.flight[rows],
         )
         self._clock[rows] = start + stance + flight
 

@@ -28,6 +28,7 @@ _UNITS = {
     "skipped": ("1", "why nothing was learned from the stride, 0 if nothing was wrong with it"),
     "heading": ("rad", "heading of the trunk at the end of the stride"),
     "tilt": ("rad", "largest angle between the trunk and the gait's"),
+    "flight_reference": ("s", "how long the reference of the flight lasted"),
     "attitude": ("rad", "roll, pitch and heading of the trunk"),
     "peak_error": ("rad", "peak of the stance error against the unmodified reference"),
     "rms_error": ("rad", "root mean square of the stance error"),

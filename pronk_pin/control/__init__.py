@@ -20,9 +20,10 @@ from .linearise import Settings, lifted_model
 from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
 from .placement import FootPlacement
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
+from .reference import FlightTiming
 from .regulation import LegAngleRegulator
 from .tape import Gains, Tape, clip_torque
-from .torque_library import TorqueLibrary
+from .torque_library import Skill, TorqueLibrary
 
 __all__ = [
     "BASES",
@@ -37,6 +38,7 @@ __all__ = [
     "Controller",
     "ControllerSpec",
     "CurrentIterationILC",
+    "FlightTiming",
     "FootPlacement",
     "Gains",
     "LearningLaw",
@@ -49,6 +51,7 @@ __all__ = [
     "PhaseLog",
     "PlantInversionILC",
     "Settings",
+    "Skill",
     "StanceContact",
     "StrideRecord",
     "StrideSelection",

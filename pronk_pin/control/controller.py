@@ -14,7 +14,7 @@ import numpy as np
 from .._state import known_name
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
-from ..gait import Gait, GaitPhase
+from ..gait import Gait
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
 from .balance import BalanceSpec
@@ -34,7 +34,8 @@ from .learning import (
 )
 from .linearise import Settings, lifted_model
 from .model_based import ModelBasedILC, NormOptimalILC
-from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
+from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
+from .reference import FlightTiming, Reference
 from .regulation import LegAngleRegulator
 from .symmetry import symmetric
 from .tape import Gains, Tape
@@ -57,6 +58,8 @@ class ControllerSpec:
         mended_gaits: Play gaits that were optimised again with the mended model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
+        timing: How practice finds out how long a flight lasts; None plays it as planned. Without
+            a law, and where nobody tells how long, it does so from the first stride on.
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
         balance: Attitude and foot placement where the trunk is free to turn.
@@ -73,6 +76,7 @@ class ControllerSpec:
     mended_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
+    timing: FlightTiming | None = None
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
     balance: BalanceSpec = field(default_factory=BalanceSpec)
@@ -94,8 +98,9 @@ class ControllerSpec:
 
 
 FLIGHT_LAW = PDTypeILC(
+    gain=0.8,
     leak=0.02,
-    delta=0.04,
+    delta=0.08,
     # The error's rate would learn the vibration of the leg after lift-off.
     gains=Gains(kd=(0.0, 0.0, 0.0)),
     filter=ZeroPhaseFilter.butterworth(3, 0.04),
@@ -106,10 +111,16 @@ CONTROLLERS = {
     spec.name: spec
     for spec in (
         ControllerSpec("pd"),
-        ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW),
+        ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming()),
         ControllerSpec("model", source="model"),
-        ControllerSpec("library", source="library"),
-        ControllerSpec("model+ilc", source="model", law=PDTypeILC(), flight_law=FLIGHT_LAW),
+        ControllerSpec("library", source="library", timing=FlightTiming()),
+        ControllerSpec(
+            "model+ilc",
+            source="model",
+            law=PDTypeILC(),
+            flight_law=FLIGHT_LAW,
+            timing=FlightTiming(),
+        ),
         ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
@@ -117,7 +128,9 @@ CONTROLLERS = {
         ControllerSpec("identified", source="identified"),
         ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
-        ControllerSpec("ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True),
+        ControllerSpec(
+            "ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True, timing=FlightTiming()
+        ),
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }
@@ -131,37 +144,6 @@ def load_controller(name: str) -> ControllerSpec:
         UnknownName: There is none.
     """
     return CONTROLLERS[known_name("controller", name, CONTROLLERS)]
-
-
-@dataclass(frozen=True)
-class _Reference:
-    """What n gaits ask for in one part of the stride, at each tick.
-
-    Attributes:
-        duration: Planned durations [s], shape (n,).
-        ticks: Ticks after which the part ends at the latest, shape (n,).
-        phase: Phase s at each tick, held at 1, shape (n, ticks).
-        position: Joint angles [rad], shape (n, ticks, 12).
-        velocity: Joint velocities [rad/s], zero where the phase is held, shape (n, ticks, 12).
-    """
-
-    duration: Array
-    ticks: IntArray
-    phase: Array
-    position: Array
-    velocity: Array
-
-    @classmethod
-    def of(cls, phases: Sequence[GaitPhase], timestep: float, latest: float) -> _Reference:
-        """Tabulate one phase of each gait, for up to `latest` times its planned duration."""
-        duration = np.array([phase.duration for phase in phases])
-        ticks = np.round(latest * duration / timestep).astype(np.intp)
-        s = np.minimum(np.arange(ticks.max()) * timestep / duration[:, None], 1.0)
-        curves = [phase.joint_reference(row) for phase, row in zip(phases, s, strict=True)]
-        velocity = np.stack([rate for _, rate in curves])
-        # Past its planned end a flight holds the posture of touchdown.
-        velocity[s >= 1.0] = 0.0
-        return cls(duration, ticks, s, np.stack([angle for angle, _ in curves]), velocity)
 
 
 class Controller:
@@ -185,6 +167,7 @@ class Controller:
         *,
         timestep: float,
         feedforward: Array | None = None,
+        flight: Array | None = None,
         base: str = "locked",
     ) -> None:
         n = len(gaits)
@@ -222,14 +205,21 @@ class Controller:
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
             )
             self._laws[0] = spec.law.along([lifted_model(robot, gait, settings) for gait in gaits])
-        self._stance = _Reference.of([gait.stance for gait in gaits], timestep, 1.0)
-        self._flight = _Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
-        self._turn, rate = spec.regulator.profile(self._flight.phase)
-        self._turn_rate = rate / self._flight.duration[:, None]
+        self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
+        self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
+        self._flown = self._flight.planned.copy()  # how long the last flights lasted
+        if flight is not None:
+            self._flight.stretch(np.arange(n), flight)
+        self._always_retimes = flight is None and not any(self._laws)
         end = np.array([1.0])
         self._lift_off_speed = np.array(
             [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
         )
+
+    @property
+    def flight(self) -> Array:
+        """How long the references of the robots' flights last [s], shape (n,)."""
+        return self._flight.duration.copy()
 
     def sideways(self, rows: IntArray) -> Array:
         """Speeds to the left with which robots left the ground [m/s], shape (m,)."""
@@ -255,8 +245,10 @@ class Controller:
             learning: Whether they learn from their last stride first, shape (len(rows),); by
                 default none does.
         """
-        if learning is not None:
-            self._learn(rows[learning & (self.skipped[rows] == 0)])
+        sound = self.skipped[rows] == 0
+        learns = sound & learning if learning is not None else np.zeros(len(rows), dtype=bool)
+        self._learn(rows[learns])
+        self._retime(rows[sound if self._always_retimes else learns])
         reference, position = self._stance, self._stance.position[rows]
         return Tape(
             feedforward=self._played(0, rows),
@@ -273,8 +265,9 @@ class Controller:
         self._stood[rows] = self._judge_contact(log)
         speed = self._estimator.update(rows, log)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
-        share, rate = self._turn[rows] * turn, self._turn_rate[rows] * turn  # (m, ticks)
         reference = self._flight
+        share, rate = self.spec.regulator.profile(reference.phase[rows])  # (m, ticks)
+        share, rate = share * turn, rate * turn / reference.duration[rows, None]
         position = rotate_leg(self.robot, reference.position[rows], share[..., None])
         velocity = reference.velocity[rows]
         velocity[..., 1::3] += rate[..., None]
@@ -300,7 +293,9 @@ class Controller:
         """
         record = self.record(1, rows, log)
         self._last[1].put(rows, record)
-        relative = duration / (self._stance.duration[rows] + self._flight.duration[rows])
+        # Contact is made between two ticks.
+        self._flown[rows] = (log.length + 0.5) * self._timestep
+        relative = duration / (self._stance.planned[rows] + self._flight.planned[rows])
         reasons = []
         for last in self._last:
             last.relative_duration[rows] = relative
@@ -338,13 +333,16 @@ class Controller:
         ticks = slice(min(reference.position.shape[1], log.joints.shape[1]))
         error = reference.position[rows, ticks] - log.joints[:, ticks]
         rate = reference.velocity[rows, ticks] - log.joint_rates[:, ticks]
+        error, rate, early = resample(error, index), resample(rate, index), error[:, : log.felt]
         return StrideRecord(
-            error=resample(error, index),
-            error_rate=resample(rate, index),
+            error=error,
+            error_rate=rate,
             feedback=resample(log.feedback, index),
             feedforward=self.feedforward[rows, part],
             missing=resample(log.missing, index),
-            contact_error=np.abs(error[:, : log.felt]).max(axis=1, initial=0.0),
+            contact_error=np.abs(early).max(axis=1, initial=0.0),
+            error_onward=held(error),
+            rate_onward=held(rate),
             relative_duration=np.full(len(rows), np.nan),
             upright=np.ones(len(rows), dtype=bool),
             robot=rows,
@@ -357,7 +355,21 @@ class Controller:
                 if law is not None:
                     record = self._last[part].take(rows)
                     told = given(record)
+                    if part == 1:
+                        # What the end of a flight does shows in the stance that follows it, which
+                        # is yet to come; it will be like the last one.
+                        ratio = self._flight.duration[rows] / self._stance.duration[rows]
+                        told = told.onward(self._last[0].take(rows), ratio)
                     if self._base == "free":
                         told = symmetric(self.robot, told)
                     learned = law.update(told)
                     self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
+
+    def _retime(self, rows: IntArray) -> None:
+        """Let the next flights of some robots last as long as practice says."""
+        if self.spec.timing is not None and rows.size:
+            flight = self._flight
+            following = self.spec.timing.next(
+                flight.duration[rows], self._flown[rows], flight.planned[rows]
+            )
+            flight.stretch(rows, following)

@@ -83,8 +83,13 @@ def first_order(values: Array, start: Array, *, time_constant: float, timestep: 
     return np.asarray(filtered)
 
 
-def look_ahead(values: Array, delta: float) -> Array:
-    """Values (n, samples, ...) on the phase grid, read at s + delta, held beyond the end."""
+def look_ahead(values: Array, delta: float, onward: Array | None = None) -> Array:
+    """Values (n, samples, ...) on the phase grid, read at s + delta.
+
+    Beyond the end `onward` (n, m, ...) goes on on the same spacing; then the last one is held.
+    """
     n, samples = values.shape[:2]
     index = np.arange(samples) + delta * (samples - 1)
+    if onward is not None:
+        values = np.concatenate([values, onward], axis=1)
     return resample(values, np.broadcast_to(index, (n, samples)))

@@ -194,6 +194,6 @@ class CurrentIterationILC:
 
 def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:
     """Kp e(s + delta) + Kd e'(s + delta) [N m], shape (n, samples, 12)."""
-    error = look_ahead(record.error, delta)
-    rate = look_ahead(record.error_rate, delta)
+    error = look_ahead(record.error, delta, record.error_onward)
+    rate = look_ahead(record.error_rate, delta, record.rate_onward)
     return gains.proportional * error + gains.derivative * rate

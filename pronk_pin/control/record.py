@@ -15,6 +15,9 @@ PARTS = ("stance", "flight")
 SAMPLES = 161
 """Samples of the phase grid s = 0 ... 1 on which strides are recorded and learned."""
 
+ONWARD = 32
+"""Samples beyond s = 1, on the same spacing, that a law may look ahead into."""
+
 
 @dataclass(frozen=True)
 class PhaseLog:
@@ -80,6 +83,9 @@ class StrideRecord:
         relative_duration: Duration of the stride over the reference's, shape (n,); NaN as long as
             the stride goes on.
         contact_error: Largest error between the contact and its being felt [rad], shape (n, 12).
+        error_onward: The error beyond s = 1, shape (n, ONWARD, 12): the last one, where nothing
+            else was put there by `onward`.
+        rate_onward: The error's time derivative likewise.
         upright: Whether the robot has not fallen, shape (n,).
         robot: Which of the controller's robots made the stride, shape (n,).
     """
@@ -91,13 +97,15 @@ class StrideRecord:
     missing: Array
     relative_duration: Array
     contact_error: Array
+    error_onward: Array
+    rate_onward: Array
     upright: BoolArray
     robot: IntArray
 
     @classmethod
     def unknown(cls, n: int) -> StrideRecord:
         """The record of n robots that have made no stride yet: NaN."""
-        shapes = [(n, SAMPLES, NL)] * 5 + [(n,), (n, NL)]
+        shapes = [(n, SAMPLES, NL)] * 5 + [(n,), (n, NL)] + [(n, ONWARD, NL)] * 2
         names = [item.name for item in fields(cls)]
         unknown = {name: np.full(shape, np.nan) for name, shape in zip(names, shapes, strict=False)}
         return cls(**unknown, upright=np.ones(n, dtype=bool), robot=np.arange(n))
@@ -116,8 +124,24 @@ class StrideRecord:
             missing=np.zeros_like(error),
             relative_duration=np.ones(n),
             contact_error=np.zeros((n, joints)),
+            error_onward=held(error),
+            rate_onward=held(error_rate),
             upright=np.ones(n, dtype=bool),
             robot=np.arange(n),
+        )
+
+    def onward(self, following: StrideRecord, ratio: Array) -> StrideRecord:
+        """The record as one that goes on into another part of the stride.
+
+        Args:
+            following: That part, of the same robots.
+            ratio: Duration of this part over that of the other, shape (n,).
+        """
+        beyond = (1.0 + np.arange(ONWARD)) * ratio[:, None]
+        return replace(
+            self,
+            error_onward=resample(following.error, beyond),
+            rate_onward=resample(following.error_rate, beyond),
         )
 
     def take(self, rows: IntArray) -> StrideRecord:
@@ -128,6 +152,11 @@ class StrideRecord:
         """Overwrite the record of some robots by that of others."""
         for item in fields(self):
             getattr(self, item.name)[rows] = getattr(other, item.name)
+
+
+def held(values: Array) -> Array:
+    """The last of the values (n, samples, ...), as they are beyond s = 1: (n, ONWARD, ...)."""
+    return np.repeat(values[:, -1:], ONWARD, axis=1)
 
 
 def phase_grid(samples: int = SAMPLES) -> Array:

@@ -35,6 +35,8 @@ def symmetric(robot: Robot, record: StrideRecord) -> StrideRecord:
         error=mean(record.error),
         error_rate=mean(record.error_rate),
         feedback=mean(record.feedback),
+        error_onward=mean(record.error_onward),
+        rate_onward=mean(record.rate_onward),
     )
 
 

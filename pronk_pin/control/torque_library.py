@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,18 @@ from .._typing import Array
 from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
 from .record import resample
 
-SCHEMA = 1
+SCHEMA = 2
 """Version of the file format."""
 _AGAIN = "practise again, and save it with TorqueLibrary.save"
+
+
+class Skill(NamedTuple):
+    """What n robots begin with; None is nothing."""
+
+    feedforward: Array | None = None
+    """Torques on the phase grids of stance and flight [N m], shape (n, 2, samples, 12)."""
+    flight: Array | None = None
+    """How long the references of the flights last [s], shape (n,); None as planned."""
 
 
 @dataclass(frozen=True)
@@ -26,22 +36,36 @@ class TorqueLibrary:
         torque: Mean feedforward on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
         spread: Its standard deviation over the strides [N m], of the same shape.
+        flight: How long the flights lasted for which they were learned [s], shape (n,); see
+            `FlightTiming`.
     """
 
     speeds: Array
     torque: Array
     spread: Array
+    flight: Array
 
     def __post_init__(self) -> None:
-        if self.torque.shape != self.spread.shape or len(self.torque) != len(self.speeds):
-            raise InvalidInput("a torque library needs one torque and one spread for each speed")
+        lengths = {len(part) for part in (self.torque, self.speeds, self.flight)}
+        if self.torque.shape != self.spread.shape or len(lengths) > 1:
+            raise InvalidInput(
+                "a torque library needs one torque, one spread and one flight for each speed"
+            )
         if np.any(np.diff(self.speeds) <= 0.0):
             raise InvalidInput("the speeds of a torque library must increase")
 
     @classmethod
-    def from_strides(cls, speeds: Array, torque: Array) -> TorqueLibrary:
-        """Average over strides: `torque` has the shape (n, strides, 2, samples, 12)."""
-        return cls(speeds, np.nanmean(torque, axis=1), np.nanstd(torque, axis=1))
+    def from_strides(cls, speeds: Array, torque: Array, flight: Array) -> TorqueLibrary:
+        """Average over strides: means of the torques, medians of the durations.
+
+        Args:
+            speeds: Increasing speeds [m/s], shape (n,).
+            torque: Feedforward [N m], shape (n, strides, 2, samples, 12); NaN where no stride is.
+            flight: Duration of the flight's reference [s], shape (n, strides).
+        """
+        mean, spread = np.nanmean(torque, axis=1), np.nanstd(torque, axis=1)
+        # Contact comes at a whole tick, and a mean of two would be between those that occur.
+        return cls(speeds, mean, spread, np.nanmedian(flight, axis=1))
 
     def at(self, speeds: Array) -> Array:
         """Torques at given speeds (m,), interpolated between neighbours [N m], (m, 2, ...).
@@ -49,17 +73,31 @@ class TorqueLibrary:
         Raises:
             SpeedOutOfRange: The library does not cover a speed.
         """
+        return np.asarray(resample(self.torque[None], self._places(speeds)[None])[0])
+
+    def skill(self, speeds: Array) -> Skill:
+        """Torques, and durations of the flights, at given speeds (m,), interpolated likewise.
+
+        Raises:
+            SpeedOutOfRange: The library does not cover a speed.
+        """
+        flight = np.interp(self._places(speeds), np.arange(len(self.flight)), self.flight)
+        return Skill(self.at(speeds), flight)
+
+    def _places(self, speeds: Array) -> Array:
+        """Fractional indices of speeds into those of the library, shape (m,)."""
         wanted, lowest, highest = np.atleast_1d(speeds), self.speeds[0], self.speeds[-1]
         for speed in wanted:
             if not lowest - 1e-9 <= speed <= highest + 1e-9:
                 raise SpeedOutOfRange(float(speed), float(lowest), float(highest))
-        position = np.interp(wanted, self.speeds, np.arange(len(self.speeds)))
-        return np.asarray(resample(self.torque[None], position[None])[0])
+        return np.interp(wanted, self.speeds, np.arange(len(self.speeds)))
 
     def without(self, speed: float) -> TorqueLibrary:
         """The library as if the practised speed next to the given one had not been practised."""
         rest = np.arange(len(self.speeds)) != int(np.argmin(np.abs(self.speeds - speed)))
-        return TorqueLibrary(self.speeds[rest], self.torque[rest], self.spread[rest])
+        return TorqueLibrary(
+            self.speeds[rest], self.torque[rest], self.spread[rest], self.flight[rest]
+        )
 
     def save(self, path: Path | str) -> None:
         """Write the library to an npz file, whole or not at all.
@@ -77,6 +115,7 @@ class TorqueLibrary:
                     speeds=self.speeds,
                     torque=self.torque,
                     spread=self.spread,
+                    flight=self.flight,
                 )
             partial.replace(path)
         except OSError as error:
@@ -96,7 +135,8 @@ class TorqueLibrary:
             with np.load(path, allow_pickle=False) as file:
                 if int(file["schema"]) != SCHEMA:
                     raise FileProblem(path, f"schema {int(file['schema'])}, not {SCHEMA}", _AGAIN)
-                parts = [np.asarray(file[name], float) for name in ("speeds", "torque", "spread")]
+                names = ("speeds", "torque", "spread", "flight")
+                parts = [np.asarray(file[name], float) for name in names]
             if not all(np.isfinite(part).all() for part in parts):
                 raise ValueError("numbers that are not finite")
             return cls(*parts)

@@ -38,7 +38,7 @@ def test_pd_alone_misses_as_much_as_the_papers(summary: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize("joint", ["calf", "thigh"])
-@pytest.mark.parametrize(("metric", "share"), [("peak_error", 0.92), ("rms_error", 0.94)])
+@pytest.mark.parametrize(("metric", "share"), [("peak_error", 0.94), ("rms_error", 0.95)])
 def test_learning_takes_away_nine_tenths_of_the_error(
     summary: pd.DataFrame, joint: str, metric: str, share: float
 ) -> None:
@@ -49,7 +49,7 @@ def test_learning_takes_away_nine_tenths_of_the_error(
 @pytest.mark.parametrize("joint", ["calf", "thigh"])
 def test_no_speed_is_worse_for_learning(summary: pd.DataFrame, joint: str) -> None:
     reduced = reduction(summary, "peak_error")
-    assert np.all(values(reduced, "peak_error", "ilc", joint) > 0.85)
+    assert np.all(values(reduced, "peak_error", "ilc", joint) > 0.9)
 
 
 def test_learning_has_settled_within_15_strides_at_every_speed(summary: pd.DataFrame) -> None:

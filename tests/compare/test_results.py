@@ -16,7 +16,7 @@ import xarray as xr
 
 from pronk_pin.compare import Experiment, Results, default_folder, summarize
 from pronk_pin.compare.provenance import git_state
-from pronk_pin.compare.results import encode
+from pronk_pin.compare.results import SCHEMA, encode
 from pronk_pin.errors import FileProblem, InvalidInput
 
 
@@ -152,7 +152,7 @@ def test_a_folder_that_holds_no_result_is_refused(tmp_path: Path) -> None:
         lambda config: json.dumps(config)[:-40],
         lambda config: "[1, 2]",
         lambda config: json.dumps({**config, "experiment": [1]}),
-        lambda config: json.dumps({"schema": 2}),
+        lambda config: json.dumps({"schema": SCHEMA}),
         lambda config: json.dumps({**config, "experiment": {**config["experiment"], "wind": 3}}),
         lambda config: json.dumps({**config, "experiment": {**config["experiment"], "speeds": []}}),
         lambda config: json.dumps({**config, "experiment": {**config["experiment"], "robot": "x"}}),
@@ -173,7 +173,7 @@ def test_a_folder_of_another_version_is_refused(copy: Results) -> None:
     path = copy.folder / "config.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "schema": 99}))
     text = message(lambda: Results.load(copy.folder), path)
-    assert text == "schema 99, not 2; run 'pronk-pin compare' to make one"
+    assert text == f"schema 99, not {SCHEMA}; run 'pronk-pin compare' to make one"
 
 
 @pytest.mark.parametrize("keep", [0, 100, 0.5], ids=["empty", "beginning only", "half"])

@@ -48,7 +48,16 @@ def stride(log: StrideLog, k: int = 0, *, left: float = 9.0) -> None:
     height = 0.34 - 0.1 * np.linspace(-1.0, 1.0, FLIGHT) ** 2
     flight = StrideRecord.of(0.5 * error, error, 2.0 * error, 3.0 * error)
     log.flight(ROW, flight, ticks(FLIGHT, height, joint=k + 0.5), length(FLIGHT))
-    log.end(ROW, np.array([0.4]), np.array([0.2]), YES, np.array([3]), tilt=0.1, heading=0.2)
+    log.end(
+        ROW,
+        np.array([0.4]),
+        np.array([0.2]),
+        YES,
+        np.array([3]),
+        tilt=0.1,
+        heading=0.2,
+        flight_reference=0.21,
+    )
 
 
 @pytest.fixture
@@ -72,6 +81,7 @@ def test_a_stride_goes_from_touchdown_to_touchdown(log: StrideLog) -> None:
             "skipped": 3.0,
             "tilt": 0.1,
             "heading": 0.2,
+            "flight_reference": 0.21,
         }
     )
 

@@ -38,11 +38,11 @@ def build(robot: Robot, gaits: list[Gait]) -> Build:
 
 
 @pytest.fixture(scope="module")
-def undisturbed(build: Build) -> Array:
-    """Feedforward learned where nothing goes wrong."""
+def undisturbed(build: Build) -> Simulation:
+    """A practice in which nothing goes wrong."""
     simulation = build(NOMINAL)
     simulation.run()
-    return simulation.controller.feedforward
+    return simulation
 
 
 def calf_peak(simulation: Simulation, robot: int, *, last: int = 4) -> float:
@@ -74,18 +74,18 @@ def watch_learning(simulation: Simulation) -> list[Array]:
     return seen
 
 
-def test_a_push_is_forgotten(build: Build, undisturbed: Array) -> None:
-    """Pushed once, hard, after 5 s."""
-    pushed = replace(NOMINAL, push_impulse=(5.0, 0.0, 0.0), push_period=5.5, push_duration=0.05)
+def test_a_push_is_forgotten(build: Build, undisturbed: Simulation) -> None:
+    """Pushed once, hard, after 5.2 s."""
+    pushed = replace(NOMINAL, push_impulse=(5.0, 0.0, 0.0), push_period=5.2, push_duration=0.05)
     simulation = build(pushed)
     learned = watch_learning(simulation)
     simulation.run()
     assert simulation.upright.all()
-    limit = 2.0 * np.abs(undisturbed[0]).max()
+    limit = 2.0 * np.abs(undisturbed.controller.feedforward[0]).max()
     assert max(np.abs(feedforward).max() for feedforward in learned) < limit
-    difference = np.abs(simulation.controller.feedforward[0] - undisturbed[0])
-    assert difference.max() < 0.15 * np.abs(undisturbed[0]).max()
-    assert calf_peak(simulation, 0) < 0.03
+    worst = float(np.nanmax(simulation.strides.peak_error[0, 15:, 2::3]))
+    assert worst > 0.02  # it was felt
+    assert calf_peak(simulation, 0) < 1.5 * calf_peak(undisturbed, 0)
 
 
 def blind(simulation: Simulation, first: int, last: int, *, robot: int = 0) -> None:

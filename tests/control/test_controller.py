@@ -13,9 +13,11 @@ from pronk_pin.control import (
     SKIPPED,
     Controller,
     ControllerSpec,
+    Gains,
     PDTypeILC,
     PhaseLog,
     Tape,
+    ZeroPhaseFilter,
     load_controller,
     phase_grid,
 )
@@ -178,7 +180,7 @@ def test_the_flight_is_learned_by_a_law_of_its_own(
 ) -> None:
     spec = ControllerSpec("mine", flight_law=PDTypeILC(gain=0.3, leak=0.0))
     controller = Controller(robot, gaits, spec, timestep=DT)
-    learn(controller, stances(), flight=replace(flights, joints=flights.joints - 0.1))
+    learn(controller, stances(0.1), flight=replace(flights, joints=flights.joints - 0.1))
     assert not controller.feedforward[:, 0].any()
     expected = 0.03 * np.tile([35.0, 60.0, 90.0], (2, SAMPLES, 4))
     np.testing.assert_allclose(controller.feedforward[:, 1], expected, atol=1e-9)
@@ -197,9 +199,67 @@ def test_a_flight_that_ends_early_is_learned_as_if_its_end_had_gone_on(
     short.joints[:, -20:] = 99.0  # what lies behind the end must not be read
     spec = ControllerSpec("mine", flight_law=PDTypeILC(gain=1.0, leak=0.0))
     controller = Controller(robot, gaits, spec, timestep=DT)
-    learn(controller, stances(), flight=short)
+    learn(controller, stances(0.1), flight=short)
     expected = 0.1 * np.tile([35.0, 60.0, 90.0], (2, SAMPLES, 4))
     np.testing.assert_allclose(controller.feedforward[:, 1], expected, atol=1e-9)
+
+
+def test_the_end_of_a_flight_is_learned_from_the_stance_that_follows(
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    learn: Callable[..., Tape],
+) -> None:
+    open_filter = ZeroPhaseFilter.butterworth(1, 0.98)
+    law = PDTypeILC(gain=1.0, leak=0.0, delta=0.1, filter=open_filter, gains=Gains(kd=(0, 0, 0)))
+    spec = ControllerSpec("mine", law=law, flight_law=law)
+    controller = Controller(robot, gaits, spec, timestep=DT)
+    early = stances()
+    # 0.1 rad in the first tenth of a stance, which is as long as 8 % of a flight or more.
+    begin = round(0.1 * gaits[0].stance.duration / DT)
+    early.joints[:, :begin] -= 0.1
+    learn(controller, early)
+    stance, flight = controller.feedforward[0, :, :, 2]
+    s, ratio = phase_grid(), gaits[0].stance.duration / gaits[0].flight.duration
+    seen = (s > 0.91) & (s < 0.9 + 0.1 * ratio - 0.01)
+    np.testing.assert_allclose(flight[seen], 9.0, rtol=0.02)  # Kp * 0.1
+    np.testing.assert_allclose(flight[s < 0.88], 0.0, atol=0.1)
+    np.testing.assert_allclose(stance[s > 0.1], 0.0, atol=0.1)  # its own look-ahead ends with it
+
+
+def test_a_flight_lasts_as_long_as_practice_says(
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    flights: PhaseLog,
+    learn: Callable[..., Tape],
+) -> None:
+    planned = np.array([gait.flight.duration for gait in gaits])
+    late = replace(flights, length=flights.length - 6)
+
+    def posture_at_touchdown(controller: Controller) -> Array:
+        tape, _ = controller.liftoff(BOTH, stances())
+        return tape.position[BOTH, late.length, 2::3].copy()  # eq. (12) turns the thighs
+
+    expected = np.stack([gait.flight.joint_reference(np.ones(1))[0][0, 2::3] for gait in gaits])
+    for name, learning, kept in (
+        ("ilc", True, False),
+        ("ilc", False, True),
+        ("library", False, False),
+        ("pd", False, True),
+        ("model", True, True),
+    ):
+        controller = Controller(robot, gaits, load_controller(name), timestep=DT)
+        as_planned = posture_at_touchdown(controller)
+        for _ in range(8):
+            learn(controller, stances(), flight=late, learning=np.full(2, learning))
+        if kept:
+            np.testing.assert_array_equal(posture_at_touchdown(controller), as_planned)
+        else:
+            # Contact is half a tick after the last one in flight, on average.
+            missed = np.abs(posture_at_touchdown(controller) - expected).max()
+            assert missed < 0.5 * DT * 25.0 < np.abs(as_planned - expected).max()  # rad, rad/s
+    assert np.all(planned > late.length * DT)
 
 
 def test_nothing_is_learned_from_strides_that_are_too_short_or_too_long(

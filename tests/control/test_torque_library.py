@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pronk_pin.control import SAMPLES, TorqueLibrary
+from pronk_pin.control.torque_library import SCHEMA
 from pronk_pin.errors import FileProblem, InvalidInput, SpeedOutOfRange
 
 SPEEDS = np.array([-0.1, 0.0, 0.3])
@@ -14,7 +15,7 @@ SPEEDS = np.array([-0.1, 0.0, 0.3])
 @pytest.fixture
 def learned() -> TorqueLibrary:
     torque = np.random.default_rng(0).normal(size=(3, 2, SAMPLES, 12))
-    return TorqueLibrary(SPEEDS, torque, np.zeros_like(torque))
+    return TorqueLibrary(SPEEDS, torque, np.zeros_like(torque), np.array([0.19, 0.2, 0.23]))
 
 
 def test_practised_speeds_get_what_was_learned_there(learned: TorqueLibrary) -> None:
@@ -24,6 +25,7 @@ def test_practised_speeds_get_what_was_learned_there(learned: TorqueLibrary) -> 
 def test_speeds_between_get_a_mixture_of_their_neighbours(learned: TorqueLibrary) -> None:
     expected = 2.0 / 3.0 * learned.torque[1] + 1.0 / 3.0 * learned.torque[2]
     np.testing.assert_allclose(learned.at(np.array([0.1]))[0], expected)
+    np.testing.assert_allclose(learned.skill(np.array([0.1, -0.1])).flight, [0.21, 0.19])
 
 
 def test_a_speed_that_was_not_practised_is_refused(learned: TorqueLibrary) -> None:
@@ -36,7 +38,9 @@ def test_strides_are_averaged_and_missing_ones_left_out() -> None:
     torque = np.zeros((2, 3, 2, SAMPLES, 12))
     torque[:, 0], torque[:, 1], torque[:, 2] = 1.0, 3.0, 5.0
     torque[1, 2] = np.nan
-    library = TorqueLibrary.from_strides(np.array([0.0, 0.1]), torque)
+    flight = np.array([[0.2, 0.21, 0.3], [0.3, 0.4, np.nan]])
+    library = TorqueLibrary.from_strides(np.array([0.0, 0.1]), torque, flight)
+    np.testing.assert_allclose(library.flight, [0.21, 0.35])
     np.testing.assert_allclose(library.torque[:, 1, 0, 0], [3.0, 2.0])
     np.testing.assert_allclose(library.spread[:, 1, 0, 0], [np.std([1.0, 3.0, 5.0]), 1.0])
 
@@ -44,13 +48,15 @@ def test_strides_are_averaged_and_missing_ones_left_out() -> None:
 def test_speeds_must_increase() -> None:
     torque = np.zeros((2, 2, SAMPLES, 12))
     with pytest.raises(InvalidInput, match="must increase"):
-        TorqueLibrary(np.array([0.1, 0.1]), torque, torque)
+        TorqueLibrary(np.array([0.1, 0.1]), torque, torque, np.ones(2))
 
 
 def test_every_speed_needs_a_torque() -> None:
     torque = np.zeros((2, 2, SAMPLES, 12))
-    with pytest.raises(InvalidInput, match="one torque and one spread for each speed"):
-        TorqueLibrary(SPEEDS, torque, torque)
+    with pytest.raises(InvalidInput, match="one flight for each speed"):
+        TorqueLibrary(SPEEDS, torque, torque, np.ones(3))
+    with pytest.raises(InvalidInput, match="one flight for each speed"):
+        TorqueLibrary(SPEEDS[:2], torque, torque, np.ones(3))
 
 
 def test_a_library_that_was_saved_is_the_same_when_loaded(
@@ -71,7 +77,7 @@ def test_a_damaged_library_says_so(learned: TorqueLibrary, tmp_path: Path) -> No
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(FileProblem, match="damaged"):
         TorqueLibrary.load(path)
-    np.savez(path, schema=np.array(1), speeds=np.array([0.0, 0.1]))
+    np.savez(path, schema=np.array(SCHEMA), speeds=np.array([0.0, 0.1]))
     with pytest.raises(FileProblem, match="damaged"):
         TorqueLibrary.load(path)
 
@@ -79,7 +85,7 @@ def test_a_damaged_library_says_so(learned: TorqueLibrary, tmp_path: Path) -> No
 def test_a_pickle_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "skill.npz"
     with path.open("wb") as file:
-        np.savez(file, schema=np.array(1), speeds=np.array([None, {}], dtype=object))
+        np.savez(file, schema=np.array(SCHEMA), speeds=np.array([None, {}], dtype=object))
     with pytest.raises(FileProblem, match="damaged"):
         TorqueLibrary.load(path)
 

@@ -112,7 +112,10 @@ def _of_the_strides(explanation: Explanation) -> Iterator[str]:
             "estimates may be biased. Explain a steadier run."
         )
     if strides < FEW_STRIDES:
-        yield f"Only {strides} strides: the intervals are rough. Let it practise longer."
+        yield (
+            f"Only {strides} strides: the intervals are rough, and may be too narrow. Let it "
+            "practise longer."
+        )
     if speeds == 1:
         yield (
             "One speed only: terms that one motion does not tell apart stay together. Practise at "

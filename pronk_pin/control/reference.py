@@ -1,0 +1,96 @@
+"""What gaits ask for, tick by tick: the tape's references, and how long a flight lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .._typing import Array, IntArray
+from ..errors import InvalidInput
+from ..gait import GaitPhase
+
+_NOTICED = 2e-5
+"""Change of a duration [s] below which a reference stays as it is."""
+
+
+@dataclass(frozen=True)
+class FlightTiming:
+    """The flight's reference lasts as long as the last flights did.
+
+    The legs swing at 20 rad/s when they touch down. A flight that lasts 5 ms longer than planned
+    (motors that act late push for longer) ends 0.1 rad from the posture in which the stance begins,
+    however well it was tracked; and no torque learned in stance makes up for that.
+
+    Attributes:
+        gain: Part of the difference that is taken over in a stride; 0 to 1.
+        limit: Largest change of the planned duration, over it.
+    """
+
+    gain: float = 0.5
+    limit: float = 0.15
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.gain <= 1.0 and 0.0 <= self.limit < 1.0):
+            raise InvalidInput("a flight's timing needs a gain in [0, 1] and a limit in [0, 1)")
+
+    def next(self, duration: Array, measured: Array, planned: Array) -> Array:
+        """The next flight's duration from that of the reference, of the flight, and of the gait."""
+        following = duration + self.gain * (measured - duration)
+        return np.clip(following, (1.0 - self.limit) * planned, (1.0 + self.limit) * planned)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What n gaits ask for in one part of the stride, at each tick.
+
+    Attributes:
+        parts: That part of each gait.
+        timestep: Length of a tick [s].
+        planned: Planned durations [s], shape (n,).
+        duration: Durations that the reference is stretched to [s], shape (n,).
+        ticks: Ticks after which the part ends at the latest, shape (n,).
+        phase: Phase s at each tick, held at 1, shape (n, ticks).
+        position: Joint angles [rad], shape (n, ticks, 12).
+        velocity: Joint velocities [rad/s], zero where the phase is held, shape (n, ticks, 12).
+    """
+
+    parts: tuple[GaitPhase, ...]
+    timestep: float
+    planned: Array
+    duration: Array
+    ticks: IntArray
+    phase: Array
+    position: Array
+    velocity: Array
+
+    @classmethod
+    def of(cls, parts: Sequence[GaitPhase], timestep: float, latest: float) -> Reference:
+        """Tabulate one part of each gait, for up to `latest` times its planned duration."""
+        planned = np.array([part.duration for part in parts])
+        ticks = np.round(latest * planned / timestep).astype(np.intp)
+        shape = (len(parts), int(ticks.max()))
+        joints = parts[0].joint_reference(np.zeros(1))[0].shape[1]
+        curves = (np.empty((*shape, joints)) for _ in range(2))
+        reference = cls(
+            tuple(parts), timestep, planned, planned.copy(), ticks, np.empty(shape), *curves
+        )
+        reference._tabulate(np.arange(len(parts)))
+        return reference
+
+    def stretch(self, rows: IntArray, duration: Array) -> None:
+        """Let the part of some robots last so long [s], shape (m,); postures stay the same."""
+        noticed = np.abs(duration - self.duration[rows]) > _NOTICED
+        self.duration[rows[noticed]] = duration[noticed]
+        self._tabulate(rows[noticed])
+
+    def _tabulate(self, rows: IntArray) -> None:
+        for row in rows:
+            part, duration = self.parts[row], self.duration[row]
+            s = np.minimum(np.arange(self.phase.shape[1]) * self.timestep / duration, 1.0)
+            position, velocity = part.joint_reference(s)
+            self.phase[row], self.position[row] = s, position
+            self.velocity[row] = velocity * (part.duration / duration)
+            # Past its end a flight holds the posture of touchdown.
+            self.velocity[row, s >= 1.0] = 0.0
