@@ -464,7 +464,7 @@ class Transfer:
     """Speeds [m/s], increasing."""
     scenario: str = "nominal"
     """World of the practice."""
-    worlds: tuple[str, ...] = ("payload", "weak-motors", "soft-ground")
+    worlds: tuple[str, ...] = ("payload", "weak-motors", "soft-ground", "slope", "gravity")
     """Worlds in which the skill is tried."""
     robot: str = "a1"
     """Robot."""

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from .._typing import Array
-from ..control import ControllerSpec, Gains
+from ..control import ControllerSpec, Gains, Skill
 from ..errors import InvalidInput
 from ..gait import Gait, load_library
 from ..robot import JOINTS, Robot, load_robot
@@ -19,6 +18,8 @@ from .simulate import Schedule, Simulation
 
 SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Feedback gains of the sweep, over the controller's own."""
+NOTHING = Skill()
+"""What a robot begins with that has not practised."""
 _PRACTICE, _LEARNING, _REPLAY = 4.0, 16.0, 16.0
 
 
@@ -49,15 +50,18 @@ def sweep_gains(
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     practice = simulate(machine, gaits, spec, scenario, Schedule(0.5, _PRACTICE, _LEARNING))
-    learned = practice.controller.feedforward
+    controller = practice.controller
+    learned = Skill(controller.feedforward, controller.flight)
     rows = []
     for share in shares:
-        for feedforward in (None, learned):
+        for skill in (NOTHING, learned):
             gains = Gains(_scaled(spec.gains.kp, share), _scaled(spec.gains.kd, share))
             replay = replace(spec, law=None, flight_law=None, gains=gains)
+            if skill is NOTHING:
+                replay = replace(replay, timing=None)  # practice finds that out, too
             schedule = Schedule(0.5, _REPLAY, 0.0)
-            done = simulate(machine, gaits, replay, scenario, schedule, feedforward)
-            rows.append({"share": share, "learned": feedforward is not None, **judged(done)})
+            done = simulate(machine, gaits, replay, scenario, schedule, skill)
+            rows.append({"share": share, "learned": skill is learned, **judged(done)})
     return pd.DataFrame(rows)
 
 
@@ -102,7 +106,7 @@ def simulate(
     spec: ControllerSpec,
     scenario: Scenario,
     schedule: Schedule,
-    feedforward: Array | None = None,
+    skill: Skill = NOTHING,
 ) -> Simulation:
     """A simulation of a controller that has been run, with one seed."""
     simulation = Simulation(
@@ -112,18 +116,20 @@ def simulate(
         scenario,
         schedule=schedule,
         rng=np.random.default_rng(0),
-        feedforward=feedforward,
+        feedforward=skill.feedforward,
+        flight=skill.flight,
     )
     simulation.run()
     return simulation
 
 
-def judged(simulation: Simulation) -> dict[str, float | int]:
-    """Mean peaks over the robots' last strides, and how many robots stayed up."""
+def judged(simulation: Simulation, robot: int | None = None) -> dict[str, float | int]:
+    """Mean peaks over the last strides of the robots, or one, and how many robots stayed up."""
     log = simulation.strides
     steady = [
         log.peak_error[k, max(0, count - STEADY_STRIDES) : count].mean(axis=0)
         for k, count in enumerate(log.count)
+        if robot in (None, k)
     ]
     peaks = np.mean(steady, axis=0).reshape(-1, len(JOINTS)).mean(axis=0)
     upright = simulation.upright

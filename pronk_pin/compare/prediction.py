@@ -64,7 +64,7 @@ class Prediction:
 def practise(
     spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario, *, robot: str, strides: int
 ) -> xr.Dataset:
-    """A short practice in simulation, with the law of the stance only.
+    """A short practice in simulation, with the law of the stance only, and flights as planned.
 
     Raises:
         InvalidInput: The controller does not learn in stance.
@@ -76,7 +76,7 @@ def practise(
     simulation = Simulation(
         load_robot(robot),
         gaits,
-        replace(spec, flight_law=None),
+        replace(spec, flight_law=None, timing=None),
         scenario,
         schedule=Schedule(practice=_PRACTICE, learning=1.25 * (strides + 2) * longest),
         rng=np.random.default_rng(0),

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from .._typing import Array
-from ..control import ControllerSpec
+from ..control import ControllerSpec, Skill
 from ..errors import InvalidInput
 from ..gait import load_library
 from ..robot import load_robot
@@ -54,8 +54,9 @@ def measure_transfers(
         robot: Short name of the robot.
 
     Returns:
-        A row for each transfer: `task`; mean peaks over the speeds [rad] of the replayed skill,
-        `thigh` and `calf`, and of one practised there, `thigh_practised` and `calf_practised`; the
+        A row for each transfer, and for each speed that was left out: `task`; mean peaks over the
+        speeds [rad] of the replayed skill, `thigh` and `calf`, and of one practised there,
+        `thigh_practised` and `calf_practised`; the
         rule's answer `reuse`; and whether that was `right`: whether practice gains no more than the
         tolerance.
     """
@@ -67,9 +68,9 @@ def measure_transfers(
     practice = simulate(machine, gaits, spec, home, _PRACTICE)
     strides = to_dataset(practice.strides, machine, gaits, attributes={"robot": robot})
     stored = torque_library(strides)  # the mean of the last strides, as the controller replays
-    skill = stored.torque
+    skill = Skill(stored.torque, stored.flight)
     inner = np.array(speeds)[1:-1]
-    left_out = np.concatenate([stored.without(v).at(np.array([v])) for v in inner])
+    left_out = Skill(np.concatenate([stored.without(v).at(np.array([v])) for v in inner]))
     at_home = simulate(machine, gaits, frozen, home, _REPLAY, skill)
     between = simulate(machine, gaits[1:-1], frozen, home, _REPLAY, left_out)
     inside = simulate(machine, gaits[1:-1], spec, home, _PRACTICE)
@@ -77,9 +78,15 @@ def measure_transfers(
     for world in worlds:
         replayed = simulate(machine, gaits, frozen, world, _REPLAY, skill)
         tasks.append((world.name, replayed, simulate(machine, gaits, spec, world, _PRACTICE)))
+    judgements = [(name, judged(one), judged(other)) for name, one, other in tasks]
+    by_speed = [
+        (f"left out {speed:+.2f} m/s", judged(between, k), judged(inside, k))
+        for k, speed in enumerate(inner)
+    ]
+    judgements[2:2] = by_speed
     rows, learned = [], _errors(judged(practice))
-    for name, replayed, practised in tasks:
-        with_skill, anew = _errors(judged(replayed)), _errors(judged(practised))
+    for name, replayed_there, practised_there in judgements:
+        with_skill, anew = _errors(replayed_there), _errors(practised_there)
         reuse = may_be_reused(with_skill, learned)
         gains_little = _rms(with_skill) <= (1.0 + TOLERANCE) * _rms(anew)
         row = {"task": name, "thigh": with_skill[0], "calf": with_skill[1]}

@@ -113,6 +113,7 @@ CONTROLLERS = {
         ControllerSpec("pd"),
         ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming()),
         ControllerSpec("model", source="model"),
+        ControllerSpec("model+timing", source="model", timing=FlightTiming()),
         ControllerSpec("library", source="library", timing=FlightTiming()),
         ControllerSpec(
             "model+ilc",
@@ -134,7 +135,7 @@ CONTROLLERS = {
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }
-"""Controllers known by name; the first five make the default comparison."""
+"""Controllers known by name."""
 
 
 def load_controller(name: str) -> ControllerSpec:

@@ -76,13 +76,18 @@ class TorqueLibrary:
         return np.asarray(resample(self.torque[None], self._places(speeds)[None])[0])
 
     def skill(self, speeds: Array) -> Skill:
-        """Torques, and durations of the flights, at given speeds (m,), interpolated likewise.
+        """Torques at given speeds (m,) and, if all were practised, how long their flights last.
+
+        Between practised speeds a flight lasts no mean of its neighbours': contact comes at whole
+        ticks, and one tick later is elsewhere. There `FlightTiming` finds out.
 
         Raises:
             SpeedOutOfRange: The library does not cover a speed.
         """
-        flight = np.interp(self._places(speeds), np.arange(len(self.flight)), self.flight)
-        return Skill(self.at(speeds), flight)
+        places = self._places(speeds)
+        nearest = np.rint(places).astype(np.intp)
+        practised = np.allclose(places, nearest, atol=1e-6)
+        return Skill(self.at(speeds), self.flight[nearest] if practised else None)
 
     def _places(self, speeds: Array) -> Array:
         """Fractional indices of speeds into those of the library, shape (m,)."""

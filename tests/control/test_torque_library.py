@@ -25,7 +25,13 @@ def test_practised_speeds_get_what_was_learned_there(learned: TorqueLibrary) -> 
 def test_speeds_between_get_a_mixture_of_their_neighbours(learned: TorqueLibrary) -> None:
     expected = 2.0 / 3.0 * learned.torque[1] + 1.0 / 3.0 * learned.torque[2]
     np.testing.assert_allclose(learned.at(np.array([0.1]))[0], expected)
-    np.testing.assert_allclose(learned.skill(np.array([0.1, -0.1])).flight, [0.21, 0.19])
+
+
+def test_only_practised_speeds_know_how_long_their_flights_last(learned: TorqueLibrary) -> None:
+    practised, between = (learned.skill(np.array(v)) for v in ([0.3, -0.1], [0.3, 0.1]))
+    np.testing.assert_array_equal(practised.flight, [0.23, 0.19])
+    assert between.flight is None
+    np.testing.assert_array_equal(between.feedforward, learned.at(np.array([0.3, 0.1])))
 
 
 def test_a_speed_that_was_not_practised_is_refused(learned: TorqueLibrary) -> None:
