@@ -113,7 +113,6 @@ CONTROLLERS = {
         ControllerSpec("pd"),
         ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming()),
         ControllerSpec("model", source="model"),
-        ControllerSpec("model+timing", source="model", timing=FlightTiming()),
         ControllerSpec("library", source="library", timing=FlightTiming()),
         ControllerSpec(
             "model+ilc",
@@ -132,6 +131,7 @@ CONTROLLERS = {
         ControllerSpec(
             "ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True, timing=FlightTiming()
         ),
+        ControllerSpec("model+timing", source="model", timing=FlightTiming()),
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }
