@@ -11,6 +11,9 @@ from .scenario import Scenario
 class Motors:
     """The motors of n robots, each on its own clock.
 
+    Commands come through late, so that as many torques are known beforehand as commands are on
+    their way; before the first has come through they are zero.
+
     Args:
         scenario: Its delay and its speed-torque curve.
         tau_max: Greatest torques [N m], shape (12,).
@@ -20,12 +23,23 @@ class Motors:
     def __init__(self, scenario: Scenario, tau_max: Array, n: int) -> None:
         self._scenario, self._tau_max = scenario, tau_max
         self._late = np.zeros((n, scenario.delay_ticks, len(tau_max)))  # commands on their way
-        self._next = np.zeros(n, dtype=np.intp)
+
+    def coming(self, rows: IntArray, ticks: int) -> Array:
+        """Commands that come through in the next ticks, at most as many as they are late by.
+
+        Returns:
+            Torques [N m], shape (m, ticks, 12).
+        """
+        return self._late[rows, :ticks]
+
+    def command(self, rows: IntArray, commands: Array, ticks: IntArray) -> None:
+        """Time goes on by so many ticks (m,), in which the commands (m, most, 12) are given."""
+        queue = np.concatenate([self._late[rows], commands], axis=1)
+        late = np.arange(self._late.shape[1])
+        self._late[rows] = queue[np.arange(len(rows))[:, None], ticks[:, None] + late]
 
     def drive(self, rows: IntArray, command: Array, rates: Array) -> Array:
         """Torques of some of the robots at this tick [N m], shape (m, 12).
-
-        Before the first command has come through the torques are zero.
 
         Args:
             rows: Which robots, shape (m,).
@@ -34,10 +48,8 @@ class Motors:
         """
         torque = command
         if self._late.shape[1]:
-            at = (rows, self._next[rows])
-            torque = self._late[at]  # a copy
-            self._late[at] = command
-            self._next[rows] = (self._next[rows] + 1) % self._late.shape[1]
+            torque = self.coming(rows, 1)[:, 0]
+            self.command(rows, command[:, None], np.ones(len(rows), dtype=np.intp))
         return np.asarray(np.where(torque * rates > 0.0, self._driven(torque, rates), torque))
 
     def _driven(self, torque: Array, rates: Array) -> Array:

@@ -164,7 +164,13 @@ class Scenario:
     def affine(self) -> bool:
         """Whether servos can play a whole phase at once, with `World.play`: nothing comes between
         the tape and the torque but what is affine in the joints' angles and velocities."""
-        return self.delay == 0.0 and self.no_load_speed is None and self.sensors.perfect
+        return self.delay == 0.0 and self.foreseeable
+
+    @property
+    def foreseeable(self) -> bool:
+        """Whether the motors give what they were told, and what they are told follows from the
+        state alone: with a delay, the torques of as many ticks are then known beforehand."""
+        return self.no_load_speed is None and self.sensors.perfect
 
     @property
     def pushes(self) -> bool:

@@ -108,8 +108,8 @@ class Simulation:
             the gaits plan them.
         base: How the trunks may move: "locked" to x and z, "sagittal" with pitch, or "free".
         chunked: Let servos play whole tapes, as MuJoCo can where the law is affine between two
-            events; otherwise the feedback is computed tick by tick, as it always is where the
-            scenario is not affine. The motion is the same.
+            events, or as many ticks as the motors are late by. Otherwise the feedback is computed
+            tick by tick, as it always is where the scenario is neither. The motion is the same.
         threads: Threads that share the robots, see `World`.
     """
 
@@ -138,10 +138,13 @@ class Simulation:
         servo = spec.gains if self._chunked else None
         self.world = World(robot, scenario, n, base=base, servo=servo, threads=threads)
         self._motors = Motors(scenario, robot.tau_max, n)
+        late = scenario.delay_ticks if chunked and scenario.foreseeable and base == "locked" else 0
+        self._ahead = 0 if self._chunked else late  # ticks whose torques are known beforehand
         self._sensors = SensorSuite(scenario.sensors, n, rng.spawn(1)[0])
         self._log = TickLog(n, self.controller.max_ticks)
         # What the robots believe: the truth itself, where they compute nothing of their own.
-        self._seen = self._log if self._chunked else TickLog(n, self.controller.max_ticks)
+        honest = self._chunked or self._ahead > 0
+        self._seen = self._log if honest else TickLog(n, self.controller.max_ticks)
         self._balance = None
         if base != "locked":
             ticks = self.controller.max_ticks
@@ -288,7 +291,13 @@ class Simulation:
         played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
         while going.size:
             who, end = rows[going], int(tape.length[going].max())
-            if told is None:
+            if told is not None:
+                stop = min(self._next_stop(who, tick), end) if airborne else end
+                motion = felt = world.play(who, told[going, tick:stop])
+            elif self._ahead:
+                stop = min(tick + self._ahead, end)
+                motion = felt = world.play(who, self._motors.coming(who, stop - tick))
+            else:
                 stop = tick + 1
                 encoders = self._sensors.encoders(who, world.joints[who], world.joint_rates[who])
                 torque = self._torque(who, encoders, tape, going, tick, part)
@@ -296,12 +305,12 @@ class Simulation:
                 motion = world.play(who, torque[:, None])
                 felt = self._felt(who, motion, encoders)
                 seen.write(who, tick, felt)
-            else:
-                stop = min(self._next_stop(who, tick), end) if airborne else end
-                motion = felt = world.play(who, told[going, tick:stop])
             log.write(who, tick, motion)
             played[going] = self._ends(who, felt, tick, tape.length[going], airborne)
-            world.advance(who, motion, np.minimum(played[going], stop) - tick)
+            count = np.minimum(played[going], stop) - tick
+            world.advance(who, motion, count)
+            if self._ahead:
+                self._motors.command(who, self._asked(motion, tape, going, tick), count)
             self._restart_broken(who)
             going, tick = going[played[going] > stop], stop
         if airborne:
@@ -315,6 +324,15 @@ class Simulation:
         """Up to which tick of a flight to play in one go."""
         expected = int(self._expected[rows].min())
         return expected if tick < expected else tick + _CHUNK
+
+    def _asked(self, motion: Motion, tape: Tape, going: IntArray, tick: int) -> Array:
+        """Torques of the feedback law along a motion from a tick on, shape (m, ticks, 12)."""
+        ticks = slice(tick, tick + motion.joints.shape[1])
+        feedback = self._gains.feedback(
+            tape.position[going, ticks] - motion.joints,
+            tape.velocity[going, ticks] - motion.joint_rates,
+        )
+        return clip_torque(feedback, tape.feedforward[going, ticks], self._tau_max)
 
     def _torque(
         self,

@@ -33,6 +33,22 @@ def test_each_robot_has_its_own_clock() -> None:
     np.testing.assert_array_equal(torques[2:], commands[:-2])
 
 
+def test_what_comes_through_is_known_as_many_ticks_ahead_as_the_motors_are_late() -> None:
+    scenario, rows, rates = replace(IDEAL, delay=0.003), np.arange(2), np.zeros((2, 12))
+    one, other = Motors(scenario, TAU_MAX, 2), Motors(scenario, TAU_MAX, 2)
+    commands = np.random.default_rng(0).normal(size=(2, 12, 12))
+    driven = np.stack([one.drive(rows, command, rates) for command in commands.swapaxes(0, 1)], 1)
+    done = np.zeros(2, dtype=np.intp)
+    for ticks in ([3, 1], [1, 3], [2, 2], [3, 3]):  # each robot on its own clock
+        coming = other.coming(rows, 3)
+        for k in rows:
+            following = driven[k, done[k] : done[k] + ticks[k]]
+            np.testing.assert_array_equal(coming[k, : ticks[k]], following)
+        given = np.stack([commands[k, done[k] : done[k] + 3] for k in rows])
+        other.command(rows, given, np.array(ticks))
+        done += ticks
+
+
 @pytest.mark.parametrize(
     ("speed", "greatest"), [(0.0, 30.0), (10.0, 30.0), (15.0, 15.0), (20.0, 0.0), (25.0, 0.0)]
 )

@@ -182,9 +182,10 @@ def test_without_start_up_and_practice_the_robots_learn_from_the_first_stride_on
     assert learner.controller.feedforward.any()
 
 
+@pytest.mark.parametrize("scenario", ["nominal", "delay", "delay=0.001"])
 @pytest.mark.parametrize("name", ["pd", "ilc"])
-def test_servos_and_feedback_tick_by_tick_give_the_same_motion_over_three_seconds(
-    robot: Robot, gaits: list[Gait], name: str
+def test_many_ticks_at_once_and_tick_by_tick_give_the_same_motion_over_three_seconds(
+    robot: Robot, gaits: list[Gait], name: str, scenario: str
 ) -> None:
     """Compared at every tick of the last strides, with learning half of the time."""
     logs = [
@@ -192,7 +193,7 @@ def test_servos_and_feedback_tick_by_tick_give_the_same_motion_over_three_second
             robot,
             gaits,
             load_controller(name),
-            load_scenario("nominal"),
+            load_scenario(scenario),
             schedule=Schedule(practice=1.5, learning=1.5),
             rng=np.random.default_rng(0),
             chunked=chunked,
