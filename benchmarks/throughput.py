@@ -47,7 +47,7 @@ def build(n: int, threads: int, *, chunked: bool) -> Simulation:
         schedule=Schedule(startup=0.1, practice=SECONDS / 2, learning=SECONDS / 2),
         rng=np.random.default_rng(0),
         chunked=chunked,
-        threads=threads if threads > 1 else 0,
+        threads=threads,
     )
 
 

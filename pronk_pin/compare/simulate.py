@@ -5,7 +5,9 @@ A stance ends by time, as its reference does; a flight ends with the touchdown t
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -110,7 +112,9 @@ class Simulation:
         chunked: Let servos play whole tapes, as MuJoCo can where the law is affine between two
             events, or as many ticks as the motors are late by. Otherwise the feedback is computed
             tick by tick, as it always is where the scenario is neither. The motion is the same.
-        threads: Threads that share the robots, see `World`.
+        threads: Threads that share the robots, whose trunks must be locked for that: each goes
+            through the strides of its own ones, and what one computes hides behind the others'
+            physics. By default the caller's only, as simulations run side by side in processes.
     """
 
     def __init__(
@@ -126,17 +130,20 @@ class Simulation:
         flight: Array | None = None,
         base: str = "locked",
         chunked: bool = True,
-        threads: int = 0,
+        threads: int = 1,
     ) -> None:
         n, dt = len(gaits), scenario.timestep
+        if threads < 1 or (threads > 1 and base != "locked"):
+            raise InvalidInput("threads must be 1 or more, and 1 where the base is not locked")
         self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
         self.controller = Controller(
             robot, gaits, spec, timestep=dt, feedforward=feedforward, flight=flight, base=base
         )
+        self._threads = threads
         self._gains, self._tau_max = spec.gains, robot.tau_max
         self._chunked = chunked and scenario.affine and base == "locked"
         servo = spec.gains if self._chunked else None
-        self.world = World(robot, scenario, n, base=base, servo=servo, threads=threads)
+        self.world = World(robot, scenario, n, base=base, servo=servo)
         self._motors = Motors(scenario, robot.tau_max, n)
         late = scenario.delay_ticks if chunked and scenario.foreseeable and base == "locked" else 0
         self._ahead = 0 if self._chunked else late  # ticks whose torques are known beforehand
@@ -178,16 +185,27 @@ class Simulation:
         Args:
             progress: Called with the number of steps done since the last call.
         """
-        schedule, dt = self.schedule, self._dt
-        steps = round((schedule.practice + schedule.learning) / dt)
-        done = 0
-        with without_warnings():
-            self._startup()
-            while (rows := np.flatnonzero(self._clock < steps)).size:
-                self._stride(rows, steps=steps)
-                if progress is not None:
-                    before, done = done, min(int(self._clock.mean()), steps)
+        schedule = self.schedule
+        steps = round((schedule.practice + schedule.learning) / self._dt)
+        done, lock = 0, threading.Lock()
+
+        def report() -> None:
+            nonlocal done
+            with lock:
+                before, done = done, min(int(self._clock.mean()), steps)
+                if progress is not None and done > before:
                     progress(done - before)
+
+        def strides(rows: IntArray) -> None:
+            while (going := rows[self._clock[rows] < steps]).size:
+                self._stride(going, steps=steps)
+                report()
+
+        with without_warnings(), ThreadPoolExecutor(self._threads) as pool:
+            self._startup()
+            shares = np.array_split(np.arange(len(self._gaits)), self._threads)
+            side_by_side = pool.map if self._threads > 1 else map
+            list(side_by_side(strides, shares))  # an error in a thread is raised here
         if progress is not None:
             progress(steps - done)
         self.strides.finish(self.upright)

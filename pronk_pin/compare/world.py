@@ -7,6 +7,7 @@ Pinocchio's order.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -127,6 +128,8 @@ class Motion(NamedTuple):
 class World:
     """n robots, each alone in the same world.
 
+    Several threads may play and advance robots at once, each its own ones.
+
     Args:
         robot: The robot.
         scenario: The world.
@@ -135,8 +138,6 @@ class World:
         servo: Gains of servos at the joints, which are then told set points (see
             `Tape.setpoint`) and keep to the motors' limits themselves; without them the motors
             are told torques.
-        threads: Threads that share the robots; by default the caller's only, so that batches run
-            side by side in processes.
 
     Attributes:
         base: Trunk x and z in the world [m], shape (n, 2).
@@ -154,14 +155,12 @@ class World:
         *,
         base: str = "locked",
         servo: Gains | None = None,
-        threads: int = 0,
     ) -> None:
         self.robot, self.scenario, self.n = robot, scenario, n
         self.model = build_model(robot, scenario, base=base, servo=servo)
-        # rollout without checks wants one model a robot, and one data a thread.
-        self._models = [self.model] * n
-        self._data = [mujoco.MjData(self.model) for _ in range(max(threads, 1))]
-        self._rollout = mujoco.rollout.Rollout(nthread=threads)
+        self._models = [self.model] * n  # rollout without checks wants one a robot
+        self._scratch = threading.local()
+        self._rollout = mujoco.rollout.Rollout(nthread=0)  # on the caller's thread
         model = self.model
         nq = model.nq
         self._qpos = np.array([1 + model.joint(name).qposadr[0] for name in robot.joint_names])
@@ -222,7 +221,7 @@ class World:
         sensors = np.empty((m, ticks, self.model.nsensordata))
         self._rollout.rollout(
             self._models[:m],
-            self._data,
+            [self._data],
             path[:, 0].copy(),
             told,
             control_spec=self._control,
@@ -245,6 +244,13 @@ class World:
             pose=self._trunk.pose(before),
             twist=self._trunk.twist(before),
         )
+
+    @property
+    def _data(self) -> mujoco.MjData:
+        """Scratch memory of the thread."""
+        if not hasattr(self._scratch, "data"):
+            self._scratch.data = mujoco.MjData(self.model)
+        return self._scratch.data
 
     def advance(self, rows: IntArray, motion: Motion, ticks: IntArray) -> None:
         """Let robots go so many ticks (m,) along a motion that they `play`; 1 or more each."""

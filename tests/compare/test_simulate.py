@@ -11,6 +11,7 @@ import pytest
 from pronk_pin._typing import Array, IntArray
 from pronk_pin.compare import Results, Schedule, Simulation, load_scenario
 from pronk_pin.compare.record import LAST, StrideLog
+from pronk_pin.compare.scenario import Scenario
 from pronk_pin.compare.world import Motion
 from pronk_pin.control import SAMPLES, ControllerSpec, Gains, load_controller
 from pronk_pin.errors import InvalidInput
@@ -187,25 +188,69 @@ def test_without_start_up_and_practice_the_robots_learn_from_the_first_stride_on
 def test_many_ticks_at_once_and_tick_by_tick_give_the_same_motion_over_three_seconds(
     robot: Robot, gaits: list[Gait], name: str, scenario: str
 ) -> None:
-    """Compared at every tick of the last strides, with learning half of the time."""
-    logs = [
+    world = load_scenario(scenario)
+    one, other = (practised(robot, gaits, name, world, chunked=way) for way in (True, False))
+    assert_same_motion(one, other)
+
+
+@pytest.mark.parametrize("scenario", ["nominal", "delay", "noise"])
+def test_threads_that_share_the_robots_give_the_same_motion(
+    robot: Robot, gaits: list[Gait], scenario: str
+) -> None:
+    world = load_scenario(scenario)
+    one, other = (practised(robot, gaits, "ilc", world, threads=threads) for threads in (1, 2))
+    assert_same_motion(one, other)
+
+
+@pytest.mark.parametrize(("threads", "base"), [(0, "locked"), (2, "free")])
+def test_threads_need_a_locked_base(
+    robot: Robot, gaits: list[Gait], threads: int, base: str
+) -> None:
+    with pytest.raises(InvalidInput, match="threads must be"):
         Simulation(
             robot,
             gaits,
-            load_controller(name),
-            load_scenario(scenario),
-            schedule=Schedule(practice=1.5, learning=1.5),
+            load_controller("pd"),
+            load_scenario("nominal"),
+            schedule=Schedule(),
             rng=np.random.default_rng(0),
-            chunked=chunked,
-        ).run()
-        for chunked in (True, False)
-    ]
-    assert np.array_equal(logs[0].count, logs[1].count)
-    for one, other in zip(*(log.ticks().values() for log in logs), strict=True):
-        assert np.isfinite(one).any()
-        np.testing.assert_array_equal(np.isnan(one), np.isnan(other))
+            threads=threads,
+            base=base,
+        )
+
+
+def practised(
+    robot: Robot,
+    gaits: list[Gait],
+    name: str,
+    world: Scenario,
+    *,
+    chunked: bool = True,
+    threads: int = 1,
+) -> StrideLog:
+    """Three seconds, with learning half of the time."""
+    simulation = Simulation(
+        robot,
+        gaits,
+        load_controller(name),
+        world,
+        schedule=Schedule(practice=1.5, learning=1.5),
+        rng=np.random.default_rng(0),
+        chunked=chunked,
+        threads=threads,
+    )
+    return simulation.run()
+
+
+def assert_same_motion(one: StrideLog, other: StrideLog) -> None:
+    """At every tick of the last strides."""
+    assert np.array_equal(one.count, other.count)
+    ticks, others = one.ticks(), other.ticks()
+    for name, values in ticks.items():
+        assert np.isfinite(values).any()
+        np.testing.assert_array_equal(np.isnan(values), np.isnan(others[name]))
     for quantity, tolerance in (("joints", 1e-6), ("base", 1e-6), ("joint_rates", 1e-4)):
-        np.testing.assert_allclose(*(log.ticks()[quantity] for log in logs), atol=tolerance)
+        np.testing.assert_allclose(ticks[quantity], others[quantity], atol=tolerance)
 
 
 def test_the_ticks_kept_are_those_of_the_last_strides(pronking: StrideLog) -> None:
