@@ -15,7 +15,6 @@ from ..control import (
     PhaseLog,
     StrideRecord,
     Tape,
-    clip_torque,
     phase_grid,
     resample,
     roll_pitch_yaw,
@@ -50,13 +49,16 @@ class TickLog:
         balance: Torques that keep the trunk up, see `control.balance` [N m], shape (n, size, 12).
         pose, twist: Trunk in Pinocchio's layout, shape (n, size, 7) and (n, size, 6).
         force: Ground's force on each foot, world frame [N], shape (n, size, 4, 3).
+        turns: Whether the trunk can turn; else `pose`, `twist` and `balance` are of no use.
     """
 
-    _STATES = ("joints", "joint_rates", "base", "base_rate", "force", "pose", "twist")
-    _TORQUES = ("feedback", "feedforward", "missing", "balance")
-
-    def __init__(self, n: int, size: int) -> None:
-        self.size = size
+    def __init__(self, n: int, size: int, *, turns: bool = True) -> None:
+        self.size, self.turns = size, turns
+        self._states = ["joints", "joint_rates", "base", "base_rate", "force"]
+        self._torques = ["feedback", "feedforward", "missing"]
+        if turns:
+            self._states += ["pose", "twist"]
+            self._torques += ["balance"]
         self.joints, self.joint_rates = np.zeros((2, n, size, NL))
         self.feedback, self.feedforward, self.missing, self.balance = np.zeros((4, n, size, NL))
         self.base, self.base_rate = np.zeros((2, n, size, 2))
@@ -66,52 +68,80 @@ class TickLog:
 
     def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
         """What robots did from a tick on."""
-        ticks = slice(tick, tick + motion.base.shape[1])
-        for name in self._STATES:
-            getattr(self, name)[rows, ticks] = getattr(motion, name)
+        at, ticks = _compact(rows), slice(tick, tick + motion.base.shape[1])
+        for name in self._states:
+            getattr(self, name)[at, ticks] = getattr(motion, name)
 
     def torques(
         self, rows: IntArray, tape: Tape, gains: Gains, tau_max: Array, played: int
     ) -> None:
         """What the tapes that were played for so many ticks asked of the motors."""
-        ticks = slice(tape.begin, played)
+        at, ticks = _compact(rows), slice(tape.begin, played)
         feedforward = tape.feedforward[:, ticks]
         feedback = gains.feedback(
-            tape.position[:, ticks] - self.joints[rows, ticks],
-            tape.velocity[:, ticks] - self.joint_rates[rows, ticks],
+            tape.position[:, ticks] - self.joints[at, ticks],
+            tape.velocity[:, ticks] - self.joint_rates[at, ticks],
         )
-        self.feedback[rows, ticks], self.feedforward[rows, ticks] = feedback, feedforward
-        balance = self.balance[rows, ticks]
-        given = clip_torque(feedback + balance, feedforward, tau_max)
-        self.missing[rows, ticks] = given - feedback - feedforward - balance
+        self.feedback[at, ticks], self.feedforward[at, ticks] = feedback, feedforward
+        asked = feedback + feedforward
+        if self.turns:
+            asked += self.balance[at, ticks]
+        self.missing[at, ticks] = np.clip(asked, -tau_max, tau_max) - asked
+
+    def torque(self, rows: IntArray, ticks: slice) -> Array:
+        """What the motors were told, within their limits [N m], shape (m, ticks, 12)."""
+        at = _compact(rows), ticks
+        torque = self.feedback[at] + self.feedforward[at]
+        torque += self.missing[at]
+        if self.turns:
+            torque += self.balance[at]
+        return torque
 
     def take_torques(self, rows: IntArray, other: TickLog) -> None:
         """Take over what another log has of the torques."""
-        for name in self._TORQUES:
+        for name in self._torques:
             getattr(self, name)[rows] = getattr(other, name)[rows]
 
     def phase(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
-        """What the controller knows of a phase that has ended after so many ticks (m,)."""
-        ticks = slice(int(length.max()))
+        """What the controller knows of a phase that has ended after so many ticks (m,).
+
+        It may share the log's memory, and holds until something else is written.
+        """
+        at = _compact(rows), slice(int(length.max()))
         return PhaseLog(
-            self.joints[rows, ticks],
-            self.joint_rates[rows, ticks],
-            self.feedback[rows, ticks],
-            self.feedforward[rows, ticks],
-            self.missing[rows, ticks],
+            self.joints[at],
+            self.joint_rates[at],
+            self.feedback[at],
+            self.feedforward[at],
+            self.missing[at],
             length,
             felt,
-            load=self.force[rows, ticks, :, 2].sum(axis=-1),
-            pose=self.pose[rows, ticks],
-            twist=self.twist[rows, ticks],
+            load=self.force[at][..., 2].sum(axis=-1),
+            pose=self.pose[at] if self.turns else None,
+            twist=self.twist[at] if self.turns else None,
         )
+
+    def attitude(self, rows: IntArray, length: IntArray, index: Array) -> Array:
+        """Roll, pitch and heading at fractional ticks (m, k) before the lengths (m,) [rad]."""
+        if not self.turns:
+            return np.zeros((*index.shape, 3))
+        quaternion = resample(self.pose[rows, : int(length.max()), 3:], index)
+        quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
+        return roll_pitch_yaw(rotation_matrix(quaternion))
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
         """So many ticks, from the ticks `start` (m,) on, are the first of the next phase."""
         kept = start[:, None] + np.arange(ticks)  # (m, ticks)
-        for name in (*self._STATES, *self._TORQUES):
+        for name in (*self._states, *self._torques):
             channel = getattr(self, name)
             channel[rows, :ticks] = channel[rows[:, None], kept]
+
+
+def _compact(rows: IntArray) -> IntArray | slice:
+    """The rows as a slice where they follow each other, which is read without being copied."""
+    first, last = int(rows[0]), int(rows[-1])
+    together = last - first == len(rows) - 1 and bool(np.all(np.diff(rows) == 1))
+    return slice(first, last + 1) if together else rows
 
 
 class StrideLog:
@@ -189,7 +219,7 @@ class StrideLog:
     def flight(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
         """A flight of so many ticks (m,) has ended."""
         ticks = np.arange(int(length.max()))
-        height = log.base[rows, : len(ticks), 1]
+        height = log.base[_compact(rows), : len(ticks), 1]
         highest = np.where(ticks < length[:, None], height, -np.inf).max(axis=1)
         self.scalars["apex"][rows, self.count[rows]] = highest
         self._keep(1, rows, record, log, length)
@@ -203,26 +233,21 @@ class StrideLog:
             self.curves[name][at] = getattr(record, name)[:, ::_EVERY]
         index = self._grid * self._planned[part, rows, None] / self._timestep
         index = np.minimum(index, length[:, None] - 1.0)
-        self.base[at] = resample(log.base[rows, : int(length.max())], index)
-        turned = roll_pitch_yaw(rotation_matrix(log.pose[rows, : int(length.max()), 3:]))
-        self.attitude[at] = resample(turned, index)
+        self.base[at] = resample(log.base[_compact(rows), : int(length.max())], index)
+        self.attitude[at] = log.attitude(rows, length, index)
         close = self._close[rows]
         if close.any():
             self._keep_ticks(part, rows[close], log, length[close])
 
     def _keep_ticks(self, part: int, rows: IntArray, log: TickLog, length: IntArray) -> None:
-        kept = (rows, self.count[rows] % LAST, part)
-        ticks = min(int(length.max()), self._ticks["base"].shape[3])
-        beyond = np.arange(ticks) >= length[:, None]
+        slot, size = self.count[rows] % LAST, self._ticks["base"].shape[3]
+        ticks = slice(min(int(length.max()), size))
+        who, beyond = np.nonzero(np.arange(size) >= length[:, None])
+        at = _compact(rows), ticks
         for name, store in self._ticks.items():
-            if name == "torque":
-                parts = (log.feedback, log.feedforward, log.balance, log.missing)
-                values = np.sum([channel[rows, :ticks] for channel in parts], axis=0)
-            else:
-                values = getattr(log, name)[rows, :ticks].copy()
-            values[beyond] = np.nan
-            store[kept] = np.nan
-            store[(*kept, slice(ticks))] = values
+            values = log.torque(rows, ticks) if name == "torque" else getattr(log, name)[at]
+            store[rows, slot, part, ticks] = values
+            store[rows[who], slot[who], part, beyond] = np.nan
 
     def end(
         self,

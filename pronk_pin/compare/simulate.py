@@ -22,7 +22,6 @@ from ..control import (
     Tape,
     clip_torque,
     phase_grid,
-    roll_pitch_yaw,
 )
 from ..conventions import rotation_matrix
 from ..errors import InvalidInput
@@ -43,7 +42,7 @@ _EARLIEST_TOUCHDOWN = 0.5
 _EXPECTED_TOUCHDOWN = 0.9
 """Phase of flight up to which it is played in one go."""
 
-_CHUNK = 20
+_CHUNK = 8
 """Ticks that are played in one go from then on; what comes after a touchdown is thrown away."""
 
 _FALLEN = 0.6
@@ -148,10 +147,11 @@ class Simulation:
         late = scenario.delay_ticks if chunked and scenario.foreseeable and base == "locked" else 0
         self._ahead = 0 if self._chunked else late  # ticks whose torques are known beforehand
         self._sensors = SensorSuite(scenario.sensors, n, rng.spawn(1)[0])
-        self._log = TickLog(n, self.controller.max_ticks)
+        turns = base != "locked"
+        self._log = TickLog(n, self.controller.max_ticks, turns=turns)
         # What the robots believe: the truth itself, where they compute nothing of their own.
         honest = self._chunked or self._ahead > 0
-        self._seen = self._log if honest else TickLog(n, self.controller.max_ticks)
+        self._seen = self._log if honest else TickLog(n, self.controller.max_ticks, turns=turns)
         self._balance = None
         if base != "locked":
             ticks = self.controller.max_ticks
@@ -247,7 +247,6 @@ class Simulation:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)
         self._rewind(rows, flight)
-        heading = roll_pitch_yaw(rotation_matrix(log.pose[rows, 0, 3:]))[:, 2]
         strides.end(
             rows,
             duration,
@@ -255,7 +254,7 @@ class Simulation:
             upright,
             controller.skipped[rows],
             tilt=tilt,
-            heading=heading,
+            heading=log.attitude(rows, flight, np.zeros((len(rows), 1)))[:, 0, 2],
             flight_reference=controller.flight[rows],
         )
         self._clock[rows] = start + stance + flight
@@ -309,14 +308,15 @@ class Simulation:
         played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
         while going.size:
             who, end = rows[going], int(tape.length[going].max())
+            stop = min(self._next_stop(who, tick, airborne), end)
+            if stop > tape.ticks:
+                tape = tape.held(end)
+                told = told if told is None else tape.setpoint(self._gains)
             if told is not None:
-                stop = min(self._next_stop(who, tick), end) if airborne else end
                 motion = felt = world.play(who, told[going, tick:stop])
             elif self._ahead:
-                stop = min(tick + self._ahead, end)
                 motion = felt = world.play(who, self._motors.coming(who, stop - tick))
             else:
-                stop = tick + 1
                 encoders = self._sensors.encoders(who, world.joints[who], world.joint_rates[who])
                 torque = self._torque(who, encoders, tape, going, tick, part)
                 torque = self._motors.drive(who, torque, world.joint_rates[who])
@@ -338,8 +338,12 @@ class Simulation:
             log.take_torques(rows, seen)
         return played
 
-    def _next_stop(self, rows: IntArray, tick: int) -> int:
-        """Up to which tick of a flight to play in one go."""
+    def _next_stop(self, rows: IntArray, tick: int, airborne: bool) -> int:
+        """Up to which tick to play in one go, if the tapes do not end before."""
+        if not self._chunked:
+            return tick + max(self._ahead, 1)
+        if not airborne:
+            return self._log.size
         expected = int(self._expected[rows].min())
         return expected if tick < expected else tick + _CHUNK
 
@@ -402,11 +406,12 @@ class Simulation:
         if airborne:
             load = motion.force[..., 2].sum(axis=-1) > self._load
             over |= load & (count > self._earliest[rows, None])
-        over |= ~finite(motion.path[:, 1:])
+        if not finite(motion.path[:, -1]).all():  # what is not finite stays so
+            over |= ~finite(motion.path[:, 1:])
         ended = over.any(axis=1)
         ends[ended] = count[np.argmax(over[ended], axis=1)]
         too_low = motion.base[..., 1] < self._floor[rows, None]
-        if self._balance is not None:
+        if motion.pose is not None:
             too_low |= rotation_matrix(motion.pose[..., 3:])[..., 2, 2] < _TUMBLED
         self.upright[rows] &= ~(too_low & (count <= ends[:, None])).any(axis=1)
         return ends

@@ -16,6 +16,7 @@ class Trunk:
     Attributes:
         x_z: Indices of the trunk's x and z.
         x_z_rate: Those of their rates.
+        turns: Whether the trunk can turn.
     """
 
     def __init__(self, model: mujoco.MjModel, robot: Robot) -> None:
@@ -31,6 +32,7 @@ class Trunk:
         else:
             self.x_z, self.x_z_rate = position[:2], rate[:2]
             self._pitch = (int(position[2]), int(rate[2])) if len(joints) > 2 else None
+        self.turns = self._free or self._pitch is not None
 
     def put(self, state: Array, pitch: Array | float, rows: IntArray | None = None) -> None:
         """Pitch the trunks of some robots in states (n, nstate), where they may turn."""

@@ -119,10 +119,10 @@ class Motion(NamedTuple):
     """Ground's force on each foot, world frame [N], shape (m, ticks, 4, 3)."""
     path: Array
     """MuJoCo's full physics states, and the one after the last tick, (m, ticks + 1, nstate)."""
-    pose: Array
-    """Trunk's position and quaternion xyzw, shape (m, ticks, 7)."""
-    twist: Array
-    """Trunk's linear and angular velocity in its own axes [m/s, rad/s], shape (m, ticks, 6)."""
+    pose: Array | None = None
+    """Trunk's position and quaternion xyzw, shape (m, ticks, 7); None where it cannot turn."""
+    twist: Array | None = None
+    """Trunk's linear and angular velocity in its own axes [m/s, rad/s], (m, ticks, 6); likewise."""
 
 
 class World:
@@ -241,8 +241,8 @@ class World:
             # The sensors are of the state before each step, and have the floor's side of it.
             force=-sensors[..., self._force],
             path=path,
-            pose=self._trunk.pose(before),
-            twist=self._trunk.twist(before),
+            pose=self._trunk.pose(before) if self._trunk.turns else None,
+            twist=self._trunk.twist(before) if self._trunk.turns else None,
         )
 
     @property

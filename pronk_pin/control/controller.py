@@ -47,6 +47,10 @@ LATEST_TOUCHDOWN = 2.0
 """Flight ends without a touchdown after this many times its planned duration."""
 
 
+_LATE_TOUCHDOWN = 1.2
+"""The tape of a flight is so many times as long as its reference, beyond which it is held."""
+
+
 @dataclass(frozen=True)
 class ControllerSpec:
     """A controller of the comparison: where its feedforward comes from, and whether it learns.
@@ -267,12 +271,13 @@ class Controller:
         speed = self._estimator.update(rows, log)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         reference = self._flight
-        share, rate = self.spec.regulator.profile(reference.phase[rows])  # (m, ticks)
+        ticks = slice(int(_LATE_TOUCHDOWN * reference.ends(rows).max()))
+        share, rate = self.spec.regulator.profile(reference.phase[rows, ticks])  # (m, ticks)
         share, rate = share * turn, rate * turn / reference.duration[rows, None]
-        position = rotate_leg(self.robot, reference.position[rows], share[..., None])
-        velocity = reference.velocity[rows]
+        position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
+        velocity = reference.velocity[rows, ticks]
         velocity[..., 1::3] += rate[..., None]
-        tape = Tape(self._played(1, rows), position, velocity, reference.ticks[rows])
+        tape = Tape(self._played(1, rows, ticks), position, velocity, reference.ticks[rows])
         return tape, record
 
     def landing(
@@ -301,7 +306,7 @@ class Controller:
         for last in self._last:
             last.relative_duration[rows] = relative
             last.upright[rows] = True if upright is None else upright
-            reasons.append(self.spec.selection.skipped(last.take(rows)))
+            reasons.append(self.spec.selection.skipped(last)[rows])
         reasons.append(self._stood[rows])
         if tilt is not None:
             far = tilt > self.spec.selection.tilt
@@ -319,9 +324,9 @@ class Controller:
         names = [SKIPPED.index("false touchdown"), SKIPPED.index("contact lost")]
         return np.asarray(np.select(wrong, names, default=0), dtype=np.intp)
 
-    def _played(self, part: int, rows: IntArray) -> Array:
+    def _played(self, part: int, rows: IntArray, ticks: slice = slice(None)) -> Array:
         """The feedforward at the ticks of a part, shape (m, ticks, 12)."""
-        phase = (self._stance, self._flight)[part].phase[rows]
+        phase = (self._stance, self._flight)[part].phase[rows, ticks]
         return resample(self.feedforward[rows, part], phase * (SAMPLES - 1))
 
     def record(self, part: int, rows: IntArray, log: PhaseLog) -> StrideRecord:

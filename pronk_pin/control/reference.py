@@ -86,11 +86,18 @@ class Reference:
         self._tabulate(rows[noticed])
 
     def _tabulate(self, rows: IntArray) -> None:
-        for row in rows:
+        for row, end in zip(rows, self.ends(rows), strict=True):
             part, duration = self.parts[row], self.duration[row]
-            s = np.minimum(np.arange(self.phase.shape[1]) * self.timestep / duration, 1.0)
+            s = np.minimum(np.arange(end) * self.timestep / duration, 1.0)
             position, velocity = part.joint_reference(s)
-            self.phase[row], self.position[row] = s, position
-            self.velocity[row] = velocity * (part.duration / duration)
+            velocity[s >= 1.0] = 0.0
             # Past its end a flight holds the posture of touchdown.
-            self.velocity[row, s >= 1.0] = 0.0
+            self.phase[row, :end], self.phase[row, end:] = s, s[-1]
+            self.position[row, :end], self.position[row, end:] = position, position[-1]
+            self.velocity[row, :end] = velocity * (part.duration / duration)
+            self.velocity[row, end:] = 0.0
+
+    def ends(self, rows: IntArray) -> IntArray:
+        """Ticks after which nothing changes any more in the references of some robots, (m,)."""
+        ends = np.ceil(self.duration[rows] / self.timestep).astype(np.intp) + 1
+        return np.minimum(ends, self.phase.shape[1])

@@ -7,7 +7,7 @@ so that servos can play a whole tape from its set points `ff + kp q_d + kd v_d` 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,8 +49,10 @@ class Gains:
             error: Reference minus measured joint angles [rad], shape (..., 12).
             error_rate: Its time derivative [rad/s], shape (..., 12).
         """
-        feedback = self.proportional * error + self.derivative * error_rate
-        feedback[~np.isfinite(feedback)] = 0.0
+        feedback = self.proportional * error
+        feedback += self.derivative * error_rate
+        if not np.isfinite(feedback.sum()):
+            feedback[~np.isfinite(feedback)] = 0.0
         return feedback
 
 
@@ -62,7 +64,8 @@ class Tape:
         feedforward: Torques [N m], shape (n, ticks, 12).
         position: Reference joint angles [rad], shape (n, ticks, 12).
         velocity: Reference joint velocities [rad/s], shape (n, ticks, 12).
-        length: Ticks after which each robot's phase ends at the latest, shape (n,).
+        length: Ticks after which each robot's phase ends at the latest, shape (n,): more than are
+            on the tape, where the last of them is to be held, see `held`.
         begin: Tick at which to begin: those before have passed already.
     """
 
@@ -71,6 +74,19 @@ class Tape:
     velocity: Array
     length: IntArray
     begin: int = 0
+
+    @property
+    def ticks(self) -> int:
+        """Ticks that are on the tape."""
+        return int(self.position.shape[1])
+
+    def held(self, ticks: int) -> Tape:
+        """The tape with so many ticks on it, or more: the last one is held."""
+        if ticks <= self.ticks:
+            return self
+        index = np.minimum(np.arange(ticks), self.ticks - 1)
+        names = ("feedforward", "position", "velocity")
+        return replace(self, **{name: getattr(self, name)[:, index] for name in names})
 
     def setpoint(self, gains: Gains) -> Array:
         """What servos with these gains are told: the torque at q = v = 0 [N m], (n, ticks, 12)."""

@@ -13,9 +13,9 @@ from .._typing import Array
 
 def bernstein(s: Array, order: int) -> Array:
     """Bernstein polynomials of an order at the phases s, shape (len(s), order + 1)."""
-    s = np.atleast_1d(np.asarray(s, dtype=float))[:, None]  # (n, 1)
-    i = np.arange(order + 1)
-    return np.asarray(comb(order, i) * s**i * (1.0 - s) ** (order - i))
+    s = np.atleast_1d(np.asarray(s, dtype=float))
+    rising, falling = np.vander(s, order + 1, increasing=True), np.vander(1.0 - s, order + 1)
+    return np.asarray(comb(order, np.arange(order + 1)) * rising * falling)
 
 
 def evaluate(coefficients: Array, s: Array, *, derivative: int = 0) -> Array:

@@ -162,13 +162,13 @@ def leg_odometry(
     shape = (*q.shape[:-1], len(robot.legs), len(JOINTS))
     legs = leg_motion(leg_geometry(robot), q[..., 7:].reshape(shape), v[..., NB:].reshape(shape))
     rotation = rotation_matrix(q[..., 3:7])
-    spin = v[..., None, 3:NB]  # (..., 1, 3)
-    velocity = -legs.velocity - np.cross(spin, legs.position)  # (..., legs, 3), in the trunk
+    # All legs see the same trunk and the same ground: the mean of theirs is that of the mean leg.
+    position, velocity, calf_rate = (motion[..., stance, :].mean(axis=-2) for motion in legs)
+    spin = v[..., 3:NB]
+    trunk = -velocity - np.cross(spin, position)  # (..., 3), in the trunk
     if contact == "rolling":
-        up = robot.foot_radius * rotation[..., None, 2, :]  # (..., 1, 3)
-        velocity = velocity + np.cross(spin + legs.calf_rate, up)
-    mean = velocity[..., stance, :].mean(axis=-2)
-    return np.asarray(np.einsum("...ij,...j->...i", rotation, mean))
+        trunk += np.cross(spin + calf_rate, robot.foot_radius * rotation[..., 2, :])
+    return np.asarray(np.einsum("...ij,...j->...i", rotation, trunk))
 
 
 def leg_angle(robot: Robot, joints: npt.ArrayLike) -> Array:

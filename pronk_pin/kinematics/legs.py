@@ -93,26 +93,25 @@ def leg_motion(geometry: LegGeometry, joints: Array, rates: Array) -> LegMotion:
         joints: Joint angles [rad], shape (..., legs, 3).
         rates: Joint velocities [rad/s], shape (..., legs, 3).
     """
-    hip_rate, thigh_rate = rates[..., 0], rates[..., 1]
-    calf_rate = thigh_rate + rates[..., 2]  # about y, of the calf against the hip link
-    upper = turn_y(joints[..., 1], geometry.calf)  # (..., legs, 3)
-    lower = turn_y(joints[..., 1] + joints[..., 2], geometry.foot)
-    arm = geometry.thigh + upper + lower
-    velocity = np.stack(
-        [
-            thigh_rate * upper[..., 2] + calf_rate * lower[..., 2],
-            -hip_rate * arm[..., 2],
-            hip_rate * arm[..., 1] - thigh_rate * upper[..., 0] - calf_rate * lower[..., 0],
-        ],
-        axis=-1,
-    )
-    spin = np.stack([hip_rate, calf_rate, np.zeros_like(hip_rate)], axis=-1)
-    hip = joints[..., 0]
-    return LegMotion(
-        position=geometry.hip + turn_x(hip, arm),
-        velocity=turn_x(hip, velocity),
-        calf_rate=turn_x(hip, spin),
-    )
+    hip, thigh, calf = np.moveaxis(joints, -1, 0).copy()  # (..., legs)
+    hip_rate, thigh_rate, bend_rate = np.moveaxis(rates, -1, 0).copy()
+    calf_rate = thigh_rate + bend_rate  # about y, of the calf against the hip link
+    upper_z, upper_x = _turned(thigh, geometry.calf[..., 2], geometry.calf[..., 0])
+    lower_z, lower_x = _turned(thigh + calf, geometry.foot[..., 2], geometry.foot[..., 0])
+    # The foot from the hip joint and its velocity, in the hip link.
+    arm_y = geometry.thigh[..., 1] + geometry.calf[..., 1] + geometry.foot[..., 1]
+    arm_z = geometry.thigh[..., 2] + upper_z + lower_z
+    rate_y = -hip_rate * arm_z
+    rate_z = hip_rate * arm_y - thigh_rate * upper_x - calf_rate * lower_x
+    cos, sin = np.cos(hip), np.sin(hip)
+    position, velocity, spin = np.empty((3, *hip.shape, 3))
+    position[..., 0] = geometry.thigh[..., 0] + upper_x + lower_x
+    position[..., 1], position[..., 2] = cos * arm_y - sin * arm_z, sin * arm_y + cos * arm_z
+    position += geometry.hip
+    velocity[..., 0] = thigh_rate * upper_z + calf_rate * lower_z
+    velocity[..., 1], velocity[..., 2] = cos * rate_y - sin * rate_z, sin * rate_y + cos * rate_z
+    spin[..., 0], spin[..., 1], spin[..., 2] = hip_rate, cos * calf_rate, sin * calf_rate
+    return LegMotion(position, velocity, spin)
 
 
 class ContactPoints(NamedTuple):
@@ -178,8 +177,9 @@ def _two_links(
     cosine = (x**2 + z**2 - upper**2 - lower**2) / (2.0 * upper * lower)
     bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if knee == "backward" else 1.0)
     calf_angle = bend + _pitch(calf[..., 0], calf[..., 2]) - _pitch(foot[..., 0], foot[..., 2])
-    leg = calf + turn_y(calf_angle, foot)  # from the thigh joint to the foot at zero thigh angle
-    thigh_angle = _pitch(x, z) - _pitch(leg[..., 0], leg[..., 2])
+    # From the thigh joint to the foot at zero thigh angle.
+    leg_z, leg_x = _turned(calf_angle, foot[..., 2], foot[..., 0])
+    thigh_angle = _pitch(x, z) - _pitch(calf[..., 0] + leg_x, calf[..., 2] + leg_z)
     return thigh_angle, calf_angle, np.asarray(np.abs(cosine) <= 1.0 + _ROUND_OFF)
 
 
@@ -188,15 +188,7 @@ def _pitch(x: Array, z: Array) -> Array:
     return np.arctan2(-x, -z)
 
 
-def turn_x(angle: Array, vector: Array) -> Array:
-    """Vectors (..., 3) turned about x by angles (...)."""
+def _turned(angle: Array, first: Array, second: Array) -> tuple[Array, Array]:
+    """Components along two axes turned by angles (...) from the first towards the second."""
     cos, sin = np.cos(angle), np.sin(angle)
-    x, y, z = np.moveaxis(vector, -1, 0)
-    return np.stack([np.broadcast_to(x, cos.shape), cos * y - sin * z, sin * y + cos * z], axis=-1)
-
-
-def turn_y(angle: Array, vector: Array) -> Array:
-    """Vectors (..., 3) turned about y by angles (...)."""
-    cos, sin = np.cos(angle), np.sin(angle)
-    x, y, z = np.moveaxis(vector, -1, 0)
-    return np.stack([cos * x + sin * z, np.broadcast_to(y, cos.shape), cos * z - sin * x], axis=-1)
+    return cos * first - sin * second, sin * first + cos * second

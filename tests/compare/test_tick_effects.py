@@ -96,19 +96,26 @@ def test_a_delay_is_the_same_torque_later(build: Build) -> None:
     late = build(replace(load_scenario("nominal"), delay=0.003))
     told: list[np.ndarray] = []  # type: ignore[type-arg]
     given: list[np.ndarray] = []  # type: ignore[type-arg]
-    drive, play = late._motors.drive, late.world.play
+    command, play, advance = late._motors.command, late.world.play, late.world.advance
 
-    def spy_drive(rows, command, rates):  # type: ignore[no-untyped-def]
-        if 0 in rows:
-            told.append(command[list(rows).index(0)].copy())
-        return drive(rows, command, rates)
+    def spy_command(rows, commands, ticks):  # type: ignore[no-untyped-def]
+        for k in np.flatnonzero(rows == 0):
+            told.extend(commands[k, : ticks[k]].copy())
+        command(rows, commands, ticks)
+
+    played: list[np.ndarray] = []  # type: ignore[type-arg]
 
     def spy_play(rows, control):  # type: ignore[no-untyped-def]
-        if 0 in rows:
-            given.append(control[list(rows).index(0), 0].copy())
+        played[:] = control.copy()
         return play(rows, control)
 
-    late._motors.drive, late.world.play = spy_drive, spy_play  # type: ignore[method-assign]
+    def spy_advance(rows, motion, ticks):  # type: ignore[no-untyped-def]
+        for k in np.flatnonzero(rows == 0):
+            given.extend(played[k][: ticks[k]])
+        advance(rows, motion, ticks)
+
+    late._motors.command = spy_command  # type: ignore[method-assign]
+    late.world.play, late.world.advance = spy_play, spy_advance  # type: ignore[method-assign]
     late.run()
     assert len(told) == len(given) > 1000
     np.testing.assert_array_equal(np.array(given)[3:], np.array(told)[:-3])

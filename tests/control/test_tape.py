@@ -47,3 +47,14 @@ def test_the_motors_get_no_more_than_their_limits() -> None:
 def test_negative_gains_are_refused() -> None:
     with pytest.raises(InvalidInput, match="feedback gains must not be negative"):
         Gains(kd=(1.0, -6.0, 2.0))
+
+
+def test_beyond_its_end_a_tape_is_held() -> None:
+    tape = random_tape(2, 5)
+    longer = tape.held(8)
+    assert tape.held(3) is tape
+    assert longer.ticks == 8
+    np.testing.assert_array_equal(longer.setpoint(GAINS)[:, :5], tape.setpoint(GAINS))
+    for name in ("feedforward", "position", "velocity"):
+        values, held = getattr(tape, name), getattr(longer, name)
+        np.testing.assert_array_equal(held[:, 5:], np.repeat(values[:, -1:], 3, axis=1))
