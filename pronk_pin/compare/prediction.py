@@ -12,6 +12,7 @@ import xarray as xr
 from .._typing import Array
 from ..control import (
     ControllerSpec,
+    GuidedStrides,
     LearningLaw,
     LiftedModel,
     ModelBasedILC,
@@ -22,6 +23,7 @@ from ..control import (
 )
 from ..control.analysis import Analysis, analyze, predict
 from ..control.guided import Rotors
+from ..control.rehearsal import rehearse
 from ..errors import InvalidInput
 from ..gait import load_library
 from ..robot import JOINTS, load_robot
@@ -41,8 +43,9 @@ class Prediction:
         controller: Short name of the controller.
         speed: Desired speed [m/s].
         analysis: What linear algebra says of the law along the gait.
-        predicted: RMS of the stance error by the model, of hip, thigh and calf [rad], shape
-            (strides + 1, 3); the first is the stride before learning.
+        predicted: RMS of the stance error by the lifted model, of hip, thigh and calf [rad],
+            shape (strides + 1, 3); the first is the stride before learning.
+        rehearsed: The same by the model's own practice; NaN from where it does not go on.
         measured: The same as it happened.
     """
 
@@ -50,15 +53,18 @@ class Prediction:
     speed: float
     analysis: Analysis
     predicted: Array
+    rehearsed: Array
     measured: Array
 
     @property
     def factor(self) -> Array:
         """By which factor prediction and measurement differ, thigh and calf together, a stride."""
-        predicted, measured = (
-            np.sqrt((values[:, 1:] ** 2).mean(axis=1)) for values in (self.predicted, self.measured)
-        )
-        return np.asarray(np.maximum(predicted / measured, measured / predicted))
+        return _factor(self.predicted, self.measured)
+
+    @property
+    def rehearsed_factor(self) -> Array:
+        """The same for the rehearsal."""
+        return _factor(self.rehearsed, self.measured)
 
 
 def practise(
@@ -105,7 +111,8 @@ def compare_prediction(
     law = _law(spec)
     robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
     settings = Settings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
-    model = lifted_model(robot, gait, settings, rotors=Rotors(scenario.armature, scenario.damping))
+    rotors = Rotors(scenario.armature, scenario.damping)
+    model = lifted_model(robot, gait, settings, rotors=rotors)
     if isinstance(law, ModelBasedILC):
         law = law.along([lifted_model(robot, gait, settings)])
     mine = strides.sel(speed=speed, method="nearest").sel(part="stance")
@@ -115,10 +122,15 @@ def compare_prediction(
         raise InvalidInput("no strides before the learning; give the practice some seconds")
     error = mine["error"].to_numpy()[first - 1 : min(made, first + number)]
     begin = _record(mine.isel(stride=first - 1), model)
-    predicted = predict(law, model, begin, len(error) - 1)
-    predicted = predicted[:, :: (predicted.shape[1] - 1) // (error.shape[1] - 1)]
+    guided = GuidedStrides(robot, gait, settings, rotors)
+    kept = slice(None, None, (model.shape[0] - 1) // (error.shape[1] - 1))
     return Prediction(
-        spec.name, speed, analyze(law, model, begin), _by_joint(predicted), _by_joint(error)
+        spec.name,
+        speed,
+        analyze(law, model, begin),
+        predicted=_by_joint(predict(law, model, begin, len(error) - 1)[:, kept]),
+        rehearsed=_by_joint(rehearse(guided, law, begin, len(error) - 1)[:, kept]),
+        measured=_by_joint(error),
     )
 
 
@@ -147,18 +159,29 @@ def describe_prediction(prediction: Prediction) -> str:
         "",
         textwrap.fill(_in_words(quasi.gain, quasi.memory, quasi.multiplier, left), _WIDTH),
         "",
-        "  stride   predicted [rad]     measured [rad]     factor",
-        "             thigh    calf      thigh    calf",
+        "           measured [rad]    lifted model [rad]        rehearsed [rad]",
+        "  stride    thigh    calf     thigh    calf  factor     thigh    calf  factor",
     ]
-    for k, (p, m, factor) in enumerate(
-        zip(prediction.predicted, prediction.measured, prediction.factor, strict=True)
-    ):
-        lines.append(
-            f"  {k:6d}   {p[1]:7.4f} {p[2]:7.4f}    {m[1]:7.4f} {m[2]:7.4f}    {factor:7.2f}"
-        )
-    worst = int(np.argmax(prediction.factor))
-    lines.append(f"\nworst factor {prediction.factor[worst]:.2f}, in stride {worst}")
+    ways = (
+        ("lifted model", prediction.predicted, prediction.factor),
+        ("rehearsal", prediction.rehearsed, prediction.rehearsed_factor),
+    )
+    for k, measured in enumerate(prediction.measured):
+        row = f"  {k:6d}  {measured[1]:7.4f} {measured[2]:7.4f}"
+        for _, rms, factor in ways:
+            row += f"   {rms[k, 1]:7.4f} {rms[k, 2]:7.4f} {factor[k]:7.2f}"
+        lines.append(row)
+    lines.append("")
+    for name, _, factor in ways:
+        worst = int(np.argmax(np.nan_to_num(factor, nan=-1.0)))
+        lines.append(f"{name}: worst factor {factor[worst]:.2f}, in stride {worst}")
     return "\n".join(lines)
+
+
+def _factor(one: Array, other: Array) -> Array:
+    """How many times the larger is the smaller, thigh and calf together, (strides,)."""
+    a, b = (np.sqrt((rms[:, 1:] ** 2).mean(axis=1)) for rms in (one, other))
+    return np.asarray(np.maximum(a / b, b / a))
 
 
 def _law(spec: ControllerSpec) -> LearningLaw:

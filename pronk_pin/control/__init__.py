@@ -6,6 +6,7 @@ from .contacts import ContactDetector, StanceContact
 from .controller import CONTROLLERS, Controller, ControllerSpec, load_controller
 from .feedforward import BASES, model_feedforward
 from .filters import ZeroPhaseFilter
+from .guided_strides import GuidedStrides, Settings
 from .learning import (
     SKIPPED,
     CurrentIterationILC,
@@ -16,7 +17,7 @@ from .learning import (
     anti_windup,
 )
 from .lifted import LiftedModel
-from .linearise import Settings, lifted_model
+from .linearise import lifted_model
 from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
 from .placement import FootPlacement
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
@@ -41,6 +42,7 @@ __all__ = [
     "FlightTiming",
     "FootPlacement",
     "Gains",
+    "GuidedStrides",
     "LearningLaw",
     "LegAngleRegulator",
     "LiftedModel",

@@ -22,6 +22,7 @@ from .contacts import ContactDetector
 from .estimation import SpeedEstimator
 from .feedforward import BASES
 from .filters import ZeroPhaseFilter
+from .guided_strides import Settings
 from .learning import (
     SKIPPED,
     CurrentIterationILC,
@@ -32,7 +33,7 @@ from .learning import (
     anti_windup,
     given,
 )
-from .linearise import Settings, lifted_model
+from .linearise import lifted_model
 from .model_based import ModelBasedILC, NormOptimalILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
 from .reference import FlightTiming, Reference

@@ -20,8 +20,12 @@ def predicted_and_measured(predictions: Sequence[Prediction]) -> Figure:
         strides = np.arange(len(prediction.measured))
         for column, joint, color in ((2, "calf", "#0072B2"), (1, "thigh", "#D55E00")):
             one.semilogy(strides, prediction.measured[:, column], "-", color=color, label=joint)
-            label = f"{joint}, predicted"
-            one.semilogy(strides, prediction.predicted[:, column], "--", color=color, label=label)
+            for rms, style, name in (
+                (prediction.rehearsed, "--", "rehearsed"),
+                (prediction.predicted, ":", "lifted model"),
+            ):
+                label = f"{joint}, {name}"
+                one.semilogy(strides, rms[:, column], style, color=color, label=label)
         radius = prediction.analysis.radius
         one.set_title(f"{prediction.speed:g} m/s, spectral radius {radius:.3f}", fontsize=9)
         one.set_xlabel("strides of learning")
