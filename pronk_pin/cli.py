@@ -22,7 +22,6 @@ from .compare import (
     default_folder,
     describe,
     explain,
-    mjcf_parity,
     run_experiment,
 )
 from .compare.changes import format_changes
@@ -78,8 +77,9 @@ class Compare:
         """Do it."""
         name = "comparison" if self.suite == "default" else self.suite
         folder = self.folder or default_folder(name)
-        if self.experiment.world:
-            print(mjcf_parity(load_robot(self.experiment.robot), self.experiment.world).table())
+        foreign = Results.create(self.experiment, folder).foreign
+        if foreign is not None:
+            print(foreign.parity.table())
         results = run_experiment(
             self.experiment, folder, workers=self.workers, executor=self.executor
         )

@@ -484,3 +484,20 @@ def test_options_out_of_range_are_refused(
         compare_models(robot, robot, **options)
     with pytest.raises(InvalidInput, match="is no model; give a Robot"):
         compare_models(robot, 3)
+
+
+def test_a_comparison_comes_back_from_its_text(robot: Robot, spec: mujoco.MjSpec) -> None:
+    endless = spec.joint(JOINT)
+    endless.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    parity = compare(robot, spec)
+    limits = next(row for row in parity.differences if row.what == "limits")
+    assert limits.b == (-np.inf, np.inf)
+    text = parity.to_json()
+    assert "Infinity" not in text
+    assert "NaN" not in text
+    back = Parity.from_json(text)
+    assert back.table(full=True) == parity.table(full=True)
+    for one, other in zip(back.rows, parity.rows, strict=True):  # NaN equals nothing
+        assert repr(one) == repr(other)
+    with pytest.raises(InvalidInput, match="this is not a comparison of models"):
+        Parity.from_json('{"rows": [{}]}')

@@ -2,7 +2,7 @@
 
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
 from .explanation import Explanation, describe, explain
-from .foreign import mjcf_parity, mjcf_spec
+from .foreign import ForeignRobot, mjcf_parity, mjcf_spec
 from .metrics import reduction, steady, summarize
 from .mismatch import KNOWN, MISMATCHES, Mismatch
 from .results import Results, default_folder
@@ -20,6 +20,7 @@ __all__ = [
     "Cell",
     "Experiment",
     "Explanation",
+    "ForeignRobot",
     "Mismatch",
     "Results",
     "Scenario",

@@ -7,7 +7,6 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +21,7 @@ from ..errors import InvalidInput
 from ..gait import SPEEDS, Gait, GaitLibrary, load_library
 from ..robot import Robot, load_robot
 from .explanation import explain, mended_gaits
-from .foreign import mjcf_spec
+from .foreign import mjcf_sha256
 from .metrics import steady
 from .scenario import load_scenario
 from .simulate import Progress, Schedule, Simulation
@@ -51,7 +50,7 @@ class Experiment:
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         world: MJCF of the robot, with the same joint names, that stands in for its URDF in the
             simulation; see `compare.foreign`. The scenarios add to what is in it: "ideal" takes it
-            as it is.
+            as it is. The file is read when the experiment is run, and not before.
         schedule: What happens when.
     """
 
@@ -65,7 +64,7 @@ class Experiment:
     schedule: Schedule = field(default_factory=Schedule)
 
     def __post_init__(self) -> None:
-        robot = load_robot(self.robot)
+        load_robot(self.robot)
         known_name("base", self.base, BASES)
         library = _gaits(self.robot, self.base)
         names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
@@ -86,7 +85,6 @@ class Experiment:
         if min(self.seeds) < 0:
             raise InvalidInput("seeds must not be negative")
         if self.world:
-            mjcf_spec(robot, self.world)
             object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
         object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
 
@@ -225,7 +223,6 @@ def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
 
 def _attributes(cell: Cell) -> dict[str, str | int | float]:
     scenario = load_scenario(cell.scenario, mjcf=cell.world)
-    world = hashlib.sha256(Path(cell.world).read_bytes()).hexdigest() if cell.world else ""
     return {
         "robot": cell.robot,
         "base": cell.base,
@@ -234,7 +231,7 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "seed": cell.seed,
         "scenario_parameters": scenario.to_json(),
         "world": cell.world,
-        "world_sha256": world,
+        "world_sha256": mjcf_sha256(cell.world) if cell.world else "",
         "timestep": scenario.timestep,
         "switch": cell.schedule.practice,
     }

@@ -9,6 +9,9 @@ too, are the scenario's, whose ground it is.
 
 from __future__ import annotations
 
+import hashlib
+import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -68,6 +71,60 @@ def mjcf_parity(robot: Robot, path: Path | str) -> Parity:
     """
     model = mjcf_spec(robot, path, actuators=True).compile()
     return compare_models(robot, model, tolerance=SIX_DIGITS)
+
+
+@dataclass(frozen=True)
+class ForeignRobot:
+    """What a result keeps of the MJCF that it was made with.
+
+    Attributes:
+        path: The file.
+        sha256: Of it and of the files it names, see `mjcf_sha256`.
+        parity: What it has otherwise than our robot (a is ours, b the file's).
+    """
+
+    path: str
+    sha256: str
+    parity: Parity
+
+    @classmethod
+    def read(cls, robot: Robot, path: Path | str) -> ForeignRobot:
+        """Look at the file; args and errors as for `mjcf_spec`."""
+        return cls(str(path), mjcf_sha256(path), mjcf_parity(robot, path))
+
+    def to_json(self) -> str:
+        """Everything in it as text; `from_json` reads it."""
+        head = {"path": self.path, "sha256": self.sha256}
+        return json.dumps({**head, "parity": json.loads(self.parity.to_json())}, indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> ForeignRobot:
+        """What `to_json` wrote.
+
+        Raises:
+            InvalidInput: The text is something else.
+        """
+        try:
+            values = json.loads(text)
+            parity = Parity.from_json(json.dumps(values["parity"]))
+            return cls(str(values["path"]), str(values["sha256"]), parity)
+        except (KeyError, TypeError, ValueError) as error:
+            raise InvalidInput(f"this is no record of an MJCF ({error}); make it again") from error
+
+
+def mjcf_sha256(path: Path | str) -> str:
+    """SHA-256 of an MJCF, followed by the files that it names as far as they are there.
+
+    Raises:
+        FileProblem: It cannot be read.
+    """
+    path = Path(path).expanduser()
+    try:
+        others = sorted({Path(name) for name in mujoco.mju_getXMLDependencies(str(path))} - {path})
+        files = [path, *(other for other in others if other.is_file())]
+        return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+    except (OSError, RuntimeError, mujoco.FatalError) as error:
+        raise _unreadable(path, error) from error
 
 
 def _trunk(spec: mujoco.MjSpec, robot: Robot, path: Path) -> mujoco.MjsBody:

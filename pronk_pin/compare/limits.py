@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -40,6 +41,11 @@ def _of_the_robot(results: Results) -> Iterator[str]:
         yield (
             f"{_listed(stance_only)} learn{'s' if len(stance_only) == 1 else ''} in stance only: "
             "what is left of the error is mostly the touchdown transient, which comes from flight."
+        )
+    if results.experiment.world:
+        yield (
+            f"The simulated robot is that of {Path(results.experiment.world).name}, and the gaits "
+            "are planned with our model: errors hold what the two have otherwise."
         )
     yield (
         "Simulation only. The true world is MuJoCo's, with a compliant ground; its contacts are "

@@ -6,6 +6,7 @@ file                   contents
 config.json            the experiment: who has it can make the rest again, to the bit
 strides/<cell>.nc      every stride of one simulation (NetCDF-4), see `compare.strides`
 summary.csv            one long table, see `compare.metrics`
+parity.json            with another robot's MJCF only (`Experiment.world`): what that has otherwise
 provenance.json        versions, machine, state of the source, times: not the same twice
 report.html, .md       tables and figures
 replay.html            the robot beside the reference, in one file
@@ -33,7 +34,9 @@ import pandas as pd
 import xarray as xr
 
 from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, UnknownName, cannot_write
+from ..robot import load_robot
 from .experiment import Cell, Experiment
+from .foreign import ForeignRobot, mjcf_sha256
 from .metrics import COLUMNS, KEYS, summarize
 from .practice import practice, rows_of_beating
 from .provenance import versions
@@ -42,6 +45,7 @@ from .simulate import Schedule
 SCHEMA = 3
 """Version of the layout of a results folder."""
 
+_PARITY = "parity.json"
 _AGAIN = "run 'pronk-pin compare' to make one"
 _ROOM = "make room, and run the same command again with --folder {folder}"
 _DAMAGE = (
@@ -67,16 +71,23 @@ class Results:
         """Make the folder, or take up one that holds the same experiment.
 
         Raises:
-            FileProblem: It cannot be written, or belongs to another experiment.
+            FileProblem: It cannot be written, or belongs to another experiment; or the experiment's
+                MJCF cannot be read.
+            InvalidInput: The MJCF is not of this robot.
         """
         results = cls(folder, experiment)
         taken = (folder / "config.json").exists()
         if taken and cls.load(folder).experiment != experiment:
             raise FileProblem(folder, "holds another experiment", "choose another folder")
+        foreign = None
+        if experiment.world and not (folder / _PARITY).exists():
+            foreign = ForeignRobot.read(load_robot(experiment.robot), experiment.world)
         try:
             (folder / "strides").mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise cannot_write(folder, error, "choose a folder of yours with --folder") from error
+        if foreign is not None:
+            results.write(_PARITY, foreign.to_json())
         if not taken:
             config = {"schema": SCHEMA, "experiment": dataclasses.asdict(experiment)}
             results.write("config.json", json.dumps(config, indent=2) + "\n")
@@ -108,13 +119,12 @@ class Results:
         The lock ends with the process, however it ends.
 
         Raises:
-            FileProblem: Another run is at it.
+            FileProblem: Another run is at it, or it is not ours to write in.
         """
         handle = os.open(self.folder, os.O_RDONLY)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            for partial in [*self.folder.glob("*.partial"), *self.folder.glob("*/*.partial")]:
-                partial.unlink()
+            self._clear_away()
             yield
         except BlockingIOError as error:
             raise FileProblem(
@@ -122,6 +132,17 @@ class Results:
             ) from error
         finally:
             os.close(handle)
+
+    def _clear_away(self) -> None:
+        for partial in [*self.folder.glob("*.partial"), *self.folder.glob("*/*.partial")]:
+            try:
+                partial.unlink()
+            except OSError as error:
+                raise FileProblem(
+                    partial,
+                    f"cannot be removed ({error.strerror})",
+                    "make the folder writable, or choose another one",
+                ) from error
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -160,6 +181,41 @@ class Results:
                         f"was begun with {name} {before[name]}, and this is {now.get(name)}",
                         "install that version again, or choose another folder",
                     )
+
+    @property
+    def foreign(self) -> ForeignRobot | None:
+        """The MJCF that it was made with, as it was when the run began; None with our own robot.
+
+        Raises:
+            FileProblem: parity.json is missing or damaged.
+        """
+        if not self.experiment.world:
+            return None
+        path = self.folder / _PARITY
+        if not path.is_file():
+            raise FileProblem(path, "missing", "run the same 'pronk-pin compare --folder' again")
+        try:
+            return ForeignRobot.from_json(path.read_text())
+        except _DAMAGE as error:
+            raise FileProblem(
+                path,
+                f"damaged ({error})",
+                "delete it and run the same 'pronk-pin compare --folder' again",
+            ) from error
+
+    def check_foreign(self) -> None:
+        """Refuse to complete a result with an MJCF that has changed since.
+
+        Raises:
+            FileProblem: It, or a file that it names, is another one now, or is gone.
+        """
+        foreign = self.foreign
+        if foreign is not None and mjcf_sha256(foreign.path) != foreign.sha256:
+            raise FileProblem(
+                foreign.path,
+                f"is not what {self.folder} was begun with",
+                "put the old file back, or choose another folder",
+            )
 
     def path(self, cell: Cell) -> Path:
         """The file of a cell's strides."""

@@ -60,7 +60,8 @@ def run_experiment(
 
     Raises:
         FileProblem: The folder cannot be written, holds another experiment, was begun with other
-            versions, or another run is writing there.
+            versions or another MJCF, or another run is writing there; or the MJCF cannot be read.
+        InvalidInput: The MJCF is not of this robot, or no worker is allowed.
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
     """
@@ -74,6 +75,7 @@ def run_experiment(
             results.summarize()
             return results  # who made the strides stays on record
         results.check_versions()
+        results.check_foreign()
         robots = len(experiment.speeds)
         with tqdm(
             total=sum(map(_robot_steps, cells)),

@@ -1,6 +1,15 @@
 """Are two models the same robot? Masses, joints and motors side by side, and M, h and J."""
 
 from .models import ROUND_OFF, SIX_DIGITS, Model, Parity, compare_models
-from .table import Row
+from .table import Row, format_value, merged
 
-__all__ = ["ROUND_OFF", "SIX_DIGITS", "Model", "Parity", "Row", "compare_models"]
+__all__ = [
+    "ROUND_OFF",
+    "SIX_DIGITS",
+    "Model",
+    "Parity",
+    "Row",
+    "compare_models",
+    "format_value",
+    "merged",
+]

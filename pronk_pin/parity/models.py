@@ -8,11 +8,14 @@ frames. The trunk's own frame does matter: it is what the base coordinates of a 
 
 from __future__ import annotations
 
+import dataclasses
+import json
+import math
 import operator
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
@@ -74,6 +77,26 @@ class Parity:
         dynamics = (self.mass_matrix, self.bias, self.jacobian)
         same = all(value is not None and value <= self.tolerance for value in dynamics)
         return same and not self.differences
+
+    def to_json(self) -> str:
+        """Everything in it as text; `from_json` reads it."""
+        return json.dumps(_written(dataclasses.asdict(self)), indent=1)
+
+    @classmethod
+    def from_json(cls, text: str) -> Parity:
+        """The comparison that `to_json` wrote.
+
+        Raises:
+            InvalidInput: The text is something else.
+        """
+        try:
+            values = json.loads(text)
+            rows = tuple(Row(**_read_again(row)) for row in values["rows"])
+            return cls(**{**values, "rows": rows})
+        except (KeyError, TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"this is not a comparison of models ({error}); make it again"
+            ) from error
 
     def table(self, *, full: bool = False) -> str:
         """The comparison as text.
@@ -166,6 +189,31 @@ def compare_models(
         jacobian=jacobian,
         reason=reason,
     )
+
+
+def _written(value: Any) -> Any:
+    """Plain data in which JSON's lack of infinity and NaN is made good: words and null."""
+    if isinstance(value, dict):
+        return {key: _written(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_written(part) for part in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    return value
+
+
+def _read_again(row: dict[str, Any]) -> dict[str, Any]:
+    """The values of a row as they were before `_written`."""
+
+    def number(value: Any) -> Any:
+        return float(value) if value in ("inf", "-inf") else value
+
+    values = {
+        key: tuple(map(number, value)) if isinstance(value, list) else number(value)
+        for key, value in row.items()
+    }
+    missing = values["difference"] is None
+    return {**values, "difference": math.nan if missing else values["difference"]}
 
 
 def _obstacle(a: Mechanism, b: Mechanism) -> str:

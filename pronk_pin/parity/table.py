@@ -173,21 +173,32 @@ def format_table(rows: Sequence[Row], *, verdict: bool) -> list[str]:
         rows: The rows.
         verdict: Add a column that marks those that differ.
     """
-    groups: dict[tuple[object, ...], list[Row]] = {}
-    for row in rows:
-        if row.what != "joint order":  # too long for a column; it has lines of its own
-            groups.setdefault((row.what, row.a, row.b, row.unit, row.agrees), []).append(row)
     lines: list[tuple[str, ...]] = [(*_HEADER, "") if verdict else _HEADER]
-    for same in groups.values():
-        lines += _cells(same, verdict=verdict)
+    for row in merged(rows):
+        lines += _cells(row, verdict=verdict)
     widths = [max(len(line[column]) for line in lines) for column in range(len(lines[0]))]
     return ["  ".join(map(str.ljust, line, widths)).rstrip() for line in lines]
 
 
-def _cells(rows: list[Row], *, verdict: bool) -> list[tuple[str, ...]]:
-    """The line of a row, or of several rows that are alike; long vectors go below each other."""
-    row = rows[0]
-    where = row.where if len(rows) == 1 else f"{row.where} and {len(rows) - 1} more"
+def merged(rows: Sequence[Row]) -> list[Row]:
+    """Rows that say the same of several joints as one, whose `where` counts them.
+
+    The order of the joints is left out: it is too long for a column.
+    """
+    groups: dict[tuple[object, ...], list[Row]] = {}
+    for row in rows:
+        if row.what != "joint order":
+            groups.setdefault((row.what, row.a, row.b, row.unit, row.agrees), []).append(row)
+    return [
+        same[0]
+        if len(same) == 1
+        else replace(same[0], where=f"{same[0].where} and {len(same) - 1} more")
+        for same in groups.values()
+    ]
+
+
+def _cells(row: Row, *, verdict: bool) -> list[tuple[str, ...]]:
+    """The lines of a row; long vectors go below each other."""
     difference = "" if np.isnan(row.difference) else f"{row.difference:.3g}"
     mark = {True: "", None: "not judged", False: "differs"}[row.agrees]
     values = [_pieces(row.a), _pieces(row.b)]
@@ -195,7 +206,9 @@ def _cells(rows: list[Row], *, verdict: bool) -> list[tuple[str, ...]]:
     for part in range(max(map(len, values))):
         first = part == 0
         a, b = (pieces[part] if part < len(pieces) else "" for pieces in values)
-        cells = (row.what, where, a, b, difference, row.unit) if first else ("", "", a, b, "", "")
+        cells = (
+            (row.what, row.where, a, b, difference, row.unit) if first else ("", "", a, b, "", "")
+        )
         lines.append((*cells, mark if first else "") if verdict else cells)
     return lines
 

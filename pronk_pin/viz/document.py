@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import re
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -169,8 +170,9 @@ def _markdown(block: _Heading | _Text | _Bullets | _Table | _Picture, folder: st
     if isinstance(block, _Heading):
         return f'<a id="{block.anchor}"></a>\n\n{"#" * block.level} {block.text}'
     if isinstance(block, _Text):
-        before = {"code": "    ", "verdict": "> "}.get(block.kind, "")
-        return before + block.text
+        if block.kind == "code":
+            return textwrap.indent(block.text, "    ")
+        return ("> " if block.kind == "verdict" else "") + block.text
     if isinstance(block, _Bullets):
         return "\n".join(f"- {item}" for item in block.items)
     if isinstance(block, _Table):

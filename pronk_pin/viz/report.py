@@ -5,14 +5,16 @@ One document, written as a self-contained report.html and as report.md with its 
 
 from __future__ import annotations
 
+import shlex
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
 
-from ..compare import Results
+from ..compare import ForeignRobot, Results
 from ..compare.limits import limitations
 from ..compare.practice import RIVAL, VARIABLES, Practice, practice
 from ..compare.statistics import CONFIDENCE, LEAST_UNITS, family
@@ -29,6 +31,7 @@ from ..compare.words import (
     verdict,
 )
 from ..errors import cannot_write
+from ..parity import Parity, Row, format_value, merged
 from . import figures, suite_figures
 from .document import Document
 from .style import save_figure
@@ -96,6 +99,8 @@ def report(results: Results) -> Document:
         document.text(verdict(summary, scenario=worlds[0], table=table.loc[worlds[0]]), "verdict")
     for world in worlds:
         _world(document, results, summary, table, world)
+    if results.foreign is not None:
+        _foreign_robot(document, results.foreign)
     document.heading("How to read the numbers", "statistics")
     document.text(_READING)
     document.heading("Known limitations", "limits")
@@ -115,6 +120,8 @@ def command(results: Results) -> str:
     words += ["--controllers " + " ".join(experiment.controllers)]
     words += ["--scenarios " + " ".join(experiment.scenarios)]
     words += ["--seeds " + " ".join(map(str, experiment.seeds))]
+    words += [f"--base {experiment.base}"]
+    words += [f"--world {shlex.quote(experiment.world)}"] if experiment.world else []
     schedule = experiment.schedule
     words += [
         f"--schedule.{name} {getattr(schedule, name):g}"
@@ -250,6 +257,71 @@ def _world(
                 document.picture(name, found[name], _CAPTIONS[name])
 
 
+def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
+    """The parity table: our model beside the robot of the MJCF that was simulated."""
+    parity, name = foreign.parity, Path(foreign.path).name
+    document.heading(f"The model beside the robot of {name}", "parity")
+    judged = [row for row in parity.rows if row.agrees is not None]
+    document.text(
+        f"Simulated is the robot of `{foreign.path}`, to which the scenarios add. The model, of "
+        f"which the gaits and the feedforward torques are made, is {parity.a}. "
+        f"{len(parity.differences)} of {len(judged)} values differ by more than "
+        f"{parity.tolerance:g} of their size."
+    )
+    masses = [row for row in parity.rows if row.what == "mass"]
+    total = {
+        name: f"{sum(m for m in values if isinstance(m, float)):.4f}"
+        for name, values in (
+            ("model", [row.a for row in masses]),
+            ("simulated", [row.b for row in masses]),
+        )
+    }
+    document.table(pd.DataFrame([total], index=["total mass [kg]"]))
+    if parity.reason:
+        document.text(f"M, h and J are not compared: {parity.reason}.")
+    else:
+        document.table(_dynamics(parity))
+    if parity.differences:
+        document.table(_differing(parity.differences))
+    actuators = sorted({str(row.b) for row in parity.rows if row.what == "actuator"} - {"motor"})
+    if actuators:
+        document.text(
+            f"Its actuators ({'; '.join(actuators)}) are played as torque motors.", "note"
+        )
+
+
+def _dynamics(parity: Parity) -> pd.DataFrame:
+    """How far the equations of motion are apart."""
+    rows = {
+        "mass matrix M": (parity.mass_matrix, "|dM_ij| / sqrt(M_ii M_jj)"),
+        "forces h = H v + G": (parity.bias, "|dh_i| / max |h_i|"),
+        "Jacobian J of the feet": (parity.jacobian, "|dJ_ij| / max |J|"),
+    }
+    return pd.DataFrame.from_dict(
+        {
+            name: ["-" if value is None else f"{value:.2g}", scale]
+            for name, (value, scale) in rows.items()
+        },
+        orient="index",
+        columns=[f"largest on {parity.states} random states", "measured as"],
+    )
+
+
+def _differing(differences: Sequence[Row]) -> pd.DataFrame:
+    """Rows of a parity table, those that say the same of several joints as one."""
+    rows = [
+        {
+            "": f"{row.what}" + (f" [{row.unit}]" if row.unit else ""),
+            "where": row.where,
+            "model": format_value(row.a),
+            "simulated": format_value(row.b),
+            "difference": number(row.difference, ".3g"),
+        }
+        for row in merged(differences)
+    ]
+    return pd.DataFrame(rows).set_index("")
+
+
 def _errors(table: pd.DataFrame) -> pd.DataFrame:
     """Errors of the controllers in a world, with intervals."""
     rows = {}
@@ -296,7 +368,8 @@ def _table_1(table: pd.DataFrame) -> pd.DataFrame:
 def _provenance(document: Document, results: Results) -> None:
     document.heading("Where these numbers come from", "provenance")
     document.text("Made again, to the bit with the same versions, by")
-    document.text("\n".join(textwrap.wrap(command(results), 100)), "code")
+    lines = textwrap.wrap(command(results), 96, break_long_words=False, break_on_hyphens=False)
+    document.text(" \\\n    ".join(lines), "code")
     document.text(
         "Every number stands in `summary.csv`, every stride in `strides/`, who made them and when "
         "in `provenance.json`."
@@ -308,6 +381,11 @@ def _provenance(document: Document, results: Results) -> None:
         rows = pd.DataFrame.from_dict(_run(run), orient="index", columns=[""])
         document.table(rows, left=True)
     seeds = ", ".join(map(str, results.experiment.seeds))
+    if results.foreign is not None:
+        document.text(
+            f"The MJCF is not in this folder; with the files it names it has the SHA-256 "
+            f"`{results.foreign.sha256}`."
+        )
     document.text(f"Seeds: {seeds}. One stream a seed, the same for every controller.")
 
 

@@ -105,7 +105,6 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
             {"scenarios": ("payload+slope", "slope+payload")},
             "scenarios must name at least one, and none of them twice",
         ),
-        ({"world": "nowhere.xml"}, "nowhere.xml: MuJoCo cannot load it"),
         ({"speeds": ()}, "speeds must name at least one, and none of them twice"),
         ({"controllers": ("pd", "pd")}, "controllers must name at least one, and none of them"),
         ({"seeds": (0, -1)}, "seeds must not be negative"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +13,18 @@ import numpy as np
 import pytest
 
 from pronk_pin._urdf import mujoco_spec
-from pronk_pin.compare import World, build_model, load_scenario, mjcf_parity, mjcf_spec
+from pronk_pin.compare import (
+    Experiment,
+    Results,
+    Schedule,
+    World,
+    build_model,
+    load_scenario,
+    mjcf_parity,
+    mjcf_spec,
+    run_experiment,
+)
+from pronk_pin.compare.foreign import mjcf_sha256
 from pronk_pin.errors import FileProblem, InvalidInput
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.parity import SIX_DIGITS, compare_models
@@ -185,3 +197,87 @@ def test_a_file_that_is_no_mjcf_is_refused(robot: Robot, tmp_path: Path, text: s
         path.write_text(text)
     with pytest.raises(FileProblem, match=r"robot.xml: MuJoCo cannot load it"):
         mjcf_spec(robot, path)
+
+
+SMALL = Experiment(
+    speeds=(0.0,),
+    controllers=("pd", "ilc"),
+    scenarios=("ideal",),
+    schedule=Schedule(startup=0.1, practice=1.0, learning=1.0),
+)
+
+
+@pytest.fixture
+def run(robot: Robot, tmp_path: Path) -> Results:
+    """A small comparison in the world of an MJCF."""
+    path = mjcf(robot, tmp_path / "robot.xml")
+    return run_experiment(replace(SMALL, world=str(path)), tmp_path / "run", progress=False)
+
+
+def test_a_result_keeps_what_the_file_had_otherwise_and_is_read_without_it(
+    robot: Robot, run: Results
+) -> None:
+    path = Path(run.experiment.world)
+    parity = mjcf_parity(robot, path)
+    path.unlink()
+    results = Results.load(run.folder)
+    assert results.foreign is not None
+    assert results.foreign.path == str(path)
+    assert results.foreign.parity.table(full=True) == parity.table(full=True)
+    again = run_experiment(results.experiment, run.folder, progress=False)  # all is there
+    assert len(again.summary())
+
+
+def test_a_result_is_completed_with_the_same_file_and_no_other(robot: Robot, run: Results) -> None:
+    path, cell = Path(run.experiment.world), run.find(controller="pd")
+    strides = run.path(cell).read_bytes()
+    run.path(cell).unlink()
+    as_it_was = path.read_text()
+    path.write_text(as_it_was.replace('damping="0.7"', 'damping="0.8"'))
+    with pytest.raises(FileProblem, match="was begun with; put the old file back") as caught:
+        run_experiment(run.experiment, run.folder, progress=False)
+    assert caught.value.path == path
+    path.unlink()
+    with pytest.raises(FileProblem, match=r"robot.xml: MuJoCo cannot load it"):
+        run_experiment(run.experiment, run.folder, progress=False)
+    path.write_text(as_it_was)
+    run_experiment(run.experiment, run.folder, progress=False)
+    assert run.path(cell).read_bytes() == strides
+
+
+def test_a_file_that_cannot_be_taken_leaves_no_folder(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    experiment = replace(SMALL, world=str(path))
+    with pytest.raises(FileProblem, match=r"robot.xml: MuJoCo cannot load it"):
+        run_experiment(experiment, tmp_path / "run", progress=False)
+    mjcf(load_robot("solo12"), path)
+    with pytest.raises(InvalidInput, match="has no joint FL_hip_joint, FL_thigh_joint"):
+        run_experiment(experiment, tmp_path / "run", progress=False)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_hash_is_of_the_file_and_of_those_it_names(tmp_path: Path) -> None:
+    (tmp_path / "legs.xml").write_text("<mujoco/>")
+    path = tmp_path / "robot.xml"
+    path.write_text('<mujoco><include file="legs.xml"/></mujoco>')
+    before = mjcf_sha256(path)
+    assert mjcf_sha256(path) == before
+    (tmp_path / "legs.xml").write_text("<mujoco><worldbody/></mujoco>")
+    assert mjcf_sha256(path) != before
+    alone = tmp_path / "alone.xml"
+    alone.write_text("<mujoco/>")
+    assert mjcf_sha256(alone) == hashlib.sha256(b"<mujoco/>").hexdigest()
+
+
+@pytest.mark.parametrize("damage", ["", "{}", '{"path": "x", "sha256": "y", "parity": {}}'])
+def test_a_damaged_record_of_the_file_is_refused_and_made_again(run: Results, damage: str) -> None:
+    path = run.folder / "parity.json"
+    whole = path.read_bytes()
+    path.write_text(damage)
+    with pytest.raises(FileProblem, match=r"parity.json: damaged \(.*delete it and run the same"):
+        _ = run.foreign
+    path.unlink()
+    with pytest.raises(FileProblem, match=r"parity.json: missing; run the same"):
+        _ = run.foreign
+    run_experiment(run.experiment, run.folder, progress=False)
+    assert path.read_bytes() == whole

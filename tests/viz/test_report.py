@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import mujoco
 import pandas as pd
 import pytest
 
-from pronk_pin import cli
+from pronk_pin import Robot, cli
+from pronk_pin._urdf import mujoco_spec
 from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
 from pronk_pin.compare.limits import limitations
 from pronk_pin.compare.suites import SUITES, load_suite
@@ -81,7 +84,8 @@ def test_the_command_makes_the_same_experiment_again(
 ) -> None:
     found: list[Experiment] = []
     monkeypatch.setattr(cli.Compare, "run", lambda self: found.append(self.experiment))
-    for experiment in (result.experiment, *map(load_suite, SUITES)):
+    others = (replace(result.experiment, base=base) for base in ("sagittal", "free"))
+    for experiment in (result.experiment, *others, *map(load_suite, SUITES)):
         words = shlex.split(command(Results(result.folder, experiment)))
         assert words[0] == "pronk-pin"
         assert cli.main(words[1:]) == 0
@@ -113,3 +117,40 @@ def test_a_report_that_cannot_be_written_is_reported(result: Results, tmp_path: 
 def test_an_unknown_suite_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["compare", "--suite", "everything"]) == 1
     assert "unknown suite 'everything'; choose one of: default, mismatch" in capsys.readouterr().err
+
+
+def test_the_report_holds_the_parity_table_of_another_robots_mjcf(
+    robot: Robot, tmp_path: Path
+) -> None:
+    """A trunk that is a kilogram heavier, and position servos."""
+    spec = mujoco_spec(robot)
+    trunk = spec.body(robot.spec.base_link)
+    before, trunk.mass = trunk.mass, trunk.mass + 1.0
+    for name in robot.urdf_joint_names:
+        servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo.set_to_position(kp=100.0)
+    spec.compile()
+    path = tmp_path / "my robot.xml"
+    path.write_text(spec.to_xml())
+    small = replace(EXPERIMENT, controllers=("pd", "ilc"), scenarios=("ideal",), world=str(path))
+    small = replace(small, schedule=Schedule(startup=0.2, practice=2.0, learning=2.0))
+    results = run_experiment(small, tmp_path / "result", workers=1, progress=False)
+    path.unlink()  # what the report needs is in the folder
+    write_report(Results.load(results.folder))
+    text = (results.folder / "report.md").read_text()
+    assert f"| total mass [kg] | {robot.mass:.4f} | {robot.mass + 1.0:.4f} |" in text
+    assert f"| mass [kg] | trunk | {before:.7g} | {before + 1.0:.7g} | 1 |" in text
+    assert "| mass matrix M | 0." in text
+    assert "Its actuators (position servo, kp 100, kv 0) are played as torque motors." in text
+    page = (results.folder / "report.html").read_text()
+    for known in ('id="parity"', "my robot.xml", f"<td>{robot.mass + 1.0:.4f}</td>", "kp 100"):
+        assert known in page
+    assert f"--world {shlex.quote(str(path))}" in command(results)
+
+
+def test_a_command_of_many_lines_can_be_pasted(result: Results) -> None:
+    text = (result.folder / "report.html").read_text()
+    block = re.search(r"<pre>(pronk-pin compare.*?)</pre>", text, re.DOTALL)
+    assert block is not None
+    assert "\n" in block[1]
+    assert shlex.split(block[1].replace("\\\n", " ")) == shlex.split(command(result))
