@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import shutil
+import stat
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from pronk_pin.compare import Experiment, Results, default_folder, summarize
+from pronk_pin.compare import Experiment, Results, default_folder, run_experiment, summarize
 from pronk_pin.compare.provenance import git_state
 from pronk_pin.compare.results import SCHEMA, encode
 from pronk_pin.errors import FileProblem, InvalidInput
@@ -283,6 +286,77 @@ def test_a_summary_that_cannot_be_written_is_reported(copy: Results) -> None:
     path.mkdir()
     (path / "in the way").touch()
     assert message(copy.summarize, path).startswith("cannot be written (")
+
+
+@contextlib.contextmanager
+def read_only(folder: Path) -> Iterator[None]:
+    """Take away the right to write in a folder, from the administrator too."""
+    nobody, administrator = 65534, os.geteuid() == 0
+    parts = [folder, *(part for part in folder.rglob("*") if part.is_dir())]
+    above = [part for part in folder.parents if part.stat().st_uid == os.geteuid()]
+    modes = {part: part.stat().st_mode for part in (*parts, *above)}
+    for part in above:
+        part.chmod(modes[part] | 0o055)  # others may pass
+    for part in parts:
+        part.chmod(0o555)
+    if administrator:
+        os.seteuid(nobody)
+    try:
+        yield
+    finally:
+        if administrator:
+            os.seteuid(0)
+        for part, mode in modes.items():
+            part.chmod(stat.S_IMODE(mode))
+
+
+def everything(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_read_only_folder_loses_nothing_and_is_named(copy: Results) -> None:
+    cell = copy.find(controller="pd")
+    before = everything(copy.folder)
+    with read_only(copy.folder):
+        for name, call in (
+            (copy.path(cell), lambda: copy.save(cell, b"new")),
+            (copy.folder / "summary.csv", copy.summarize),
+        ):
+            text = message(call, name)
+            assert text.startswith("cannot be written (Permission denied); ")
+        assert len(copy.summary())  # it can still be read
+    assert everything(copy.folder) == before
+
+
+def test_a_run_in_a_read_only_folder_says_so_before_it_simulates(
+    copy: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy.path(copy.find(controller="library")).unlink()
+    left = copy.folder / "summary.csv.partial"  # of a run that was killed
+    left.write_bytes(b"half")
+    before = everything(copy.folder)
+    monkeypatch.setattr("pronk_pin.compare.run.run_cell", lambda *_: pytest.fail("simulated"))
+    with read_only(copy.folder):
+        text = message(lambda: run_experiment(copy.experiment, copy.folder, workers=1), left)
+        assert text.startswith("cannot be removed (Permission denied); ")
+    left.unlink()
+    del before[str(left)]
+    with read_only(copy.folder):
+        text = message(
+            lambda: run_experiment(copy.experiment, copy.folder, workers=1),
+            copy.folder / "provenance.json",
+        )
+        assert text.startswith("cannot be written (Permission denied); ")
+    assert everything(copy.folder) == before
+
+
+def test_no_folder_is_made_where_one_may_not_write(tmp_path: Path) -> None:
+    place = tmp_path / "closed"
+    place.mkdir()
+    with read_only(place):
+        text = message(lambda: Results.create(Experiment(), place / "new"), place / "new")
+    assert text == "cannot be written (Permission denied); choose a folder of yours with --folder"
+    assert not list(place.iterdir())
 
 
 def test_folders_are_named_by_time_and_purpose() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
 import mujoco
@@ -186,6 +187,22 @@ def test_a_softer_ground_gives_way_more(robot: Robot) -> None:
         heights.append(foot_positions(robot, q)[:, 2].mean())
     assert heights[1] < heights[0] - 1e-4
     assert heights[0] == pytest.approx(robot.foot_radius, abs=1e-3)
+
+
+def test_joints_stand_in_the_order_of_the_urdf_document_and_motors_in_ours(
+    any_robot: Robot,
+) -> None:
+    document = ElementTree.parse(any_robot.urdf_path).getroot()
+    order = [
+        joint.get("name") for joint in document.findall("joint") if joint.get("type") != "fixed"
+    ]
+    model = build_model(any_robot, load_scenario("nominal"), base="free")
+    hinges = [i for i in range(model.njnt) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_HINGE]
+    assert [model.joint(i).name for i in hinges] == order
+    assert list(any_robot.urdf_joint_names) == order
+    driven = [model.joint(model.actuator_trnid[k, 0]).name for k in range(model.nu)]
+    assert driven == list(any_robot.joint_names)
+    assert list(model.jnt_qposadr[hinges]) == list(range(7, 7 + len(order)))
 
 
 @pytest.mark.parametrize("name", ROBOTS)
