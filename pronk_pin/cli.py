@@ -65,7 +65,8 @@ class Compare:
     experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
     """What to compare."""
     suite: str = "default"
-    """A named experiment, which the other options change: default, mismatch, control, paper."""
+    """A named experiment, which the other options change: default, mismatch, sampled, control,
+    paper."""
     folder: Path | None = None
     """Results folder; by default results/<time>-comparison."""
     workers: int | None = None

@@ -11,7 +11,7 @@ import pandas as pd
 from ..control import SKIPPED, load_controller
 from .paper import table_1
 from .results import Results
-from .statistics import CONFIDENCE, LEAST_UNITS, family, robots
+from .statistics import CONFIDENCE, LEAST_UNITS, family, robots, sampled, unit_of
 from .tables import SHOWN
 
 _STEADY_APEX = 0.004
@@ -55,22 +55,27 @@ def _of_the_robot(results: Results) -> Iterator[str]:
 
 def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
     worlds, seeds = results.experiment.scenarios, results.experiment.seeds
-    by_seed = any(
-        len(robots(summary, scenario=name, controller=summary["controller"].iloc[0])) >= LEAST_UNITS
-        for name in {family(world) for world in worlds}
-    )
-    if not by_seed:
+    first = summary["controller"].iloc[0]
+    families = {family(world) for world in worlds}
+    units = {unit_of(robots(summary, scenario=name, controller=first)) for name in families}
+    if units == {"speed"}:
         count = "One seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
         yield (
             f"{count}: fewer than {LEAST_UNITS} are no sample, so intervals are drawn over the "
             f"{len(results.experiment.speeds)} speeds. They say how the mean would scatter over "
             "speeds and starting postures like these, not over other worlds."
         )
+    if any(map(sampled, worlds)):
+        yield (
+            "The sampled worlds are drawn from ranges that we have chosen (docs/worlds.md has "
+            "them): intervals over them speak of worlds like these, at the speeds "
+            f"{', '.join(f'{speed:g}' for speed in results.experiment.speeds)} m/s."
+        )
     yield (
         "Seeds differ in the starting posture alone where the world is not sampled and has no "
         "noise; a steady gait forgets it, and intervals over such seeds are small."
     )
-    pairs = summary.groupby(["scenario", "controller"]).ngroups * len(SHOWN)
+    pairs = len(families) * summary["controller"].nunique() * len(SHOWN)
     yield (
         f"Each interval holds its value with {CONFIDENCE:.0%}; of the {pairs} mean errors here, "
         f"about {(1 - CONFIDENCE) * pairs:.0f} intervals miss theirs by chance."
@@ -141,14 +146,14 @@ def _of_the_motion(summary: pd.DataFrame) -> Iterator[str]:
     for (scenario, controller), rows in fallen.groupby(["scenario", "controller"]):
         speeds = ", ".join(f"{speed:g}" for speed in sorted(set(rows["speed"])))
         yield (
-            f"In {scenario} under {controller} {len(rows)} robots fell ({speeds} m/s): their "
-            "errors are not in the means."
+            f"In {scenario} under {controller} {_robots(len(rows))} fell ({speeds} m/s): the "
+            "errors of those that fell are not in the means."
         )
     apex = summary[(summary["metric"] == "apex_deviation") & (summary["value"] > _STEADY_APEX)]
     for (scenario, controller), rows in apex.groupby(["scenario", "controller"]):
         yield (
-            f"In {scenario} under {controller} the apex of {len(rows)} robots still varies by more "
-            f"than {1e3 * _STEADY_APEX:.0f} mm (s.d.) from stride to stride."
+            f"In {scenario} under {controller} the apex of {_robots(len(rows))} still varies by "
+            f"more than {1e3 * _STEADY_APEX:.0f} mm (s.d.) from stride to stride."
         )
 
 
@@ -158,6 +163,10 @@ def _of_the_record(results: Results) -> Iterator[str]:
         yield "The run is not on record as finished."
     if any((run.get("git") or "").endswith("changed") for run in runs):
         yield "It was made from a source that differs from the commit named below."
+
+
+def _robots(count: int) -> str:
+    return f"{count} robot" + ("s" if count != 1 else "")
 
 
 def _listed(names: list[str]) -> str:

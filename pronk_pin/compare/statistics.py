@@ -1,10 +1,11 @@
 """How sure the numbers are: intervals, paired differences, and who beats whom how often.
 
 What is compared are errors of the same robots (same speed, world and seed) under two controllers.
-The unit that is drawn again and again is the seed with its sampled world: robots of one unit share
-the world that was drawn. Where there are fewer than `LEAST_UNITS` of them, the speeds are the unit,
-each the mean over its seeds; the interval then says how the mean would scatter over other speeds
-and starting postures like these, and nothing about other worlds. Every result names its unit.
+The unit that is drawn again and again is the sampled world, whose robots share what was drawn, or
+the seed in a world that is not sampled. Where there are fewer than `LEAST_UNITS` of them, the
+speeds are the unit, each the mean over its seeds; the interval then says how the mean would scatter
+over other speeds and starting postures like these, and nothing about other worlds. Every result
+names its unit.
 
 A robot that fell has no error worth a number: it counts among the fallen, loses every comparison
 with one that did not fall, and is left out of means and differences.
@@ -26,7 +27,7 @@ CONFIDENCE = 0.95
 """Level of every interval."""
 
 LEAST_UNITS = 5
-"""Fewest seeds, or sampled worlds, that are drawn from to make an interval."""
+"""Fewest sampled worlds, or seeds, that are drawn from to make an interval."""
 
 RESAMPLES = 4999
 """Samples that the bootstrap draws."""
@@ -67,7 +68,7 @@ class Comparison(NamedTuple):
     pairs: int
     """Pairs in which neither fell: those of the difference and the reduction."""
     unit: str
-    """What was drawn: "seed" or "speed"."""
+    """What was drawn: "world", "seed" or "speed"."""
 
     @property
     def better(self) -> bool | None:
@@ -80,6 +81,11 @@ class Comparison(NamedTuple):
 def family(scenario: str) -> str:
     """What a scenario is a sample of: "random-3" for "random-3-0"; itself if it is not sampled."""
     return _SAMPLED.sub(r"random-\1", scenario)
+
+
+def sampled(scenario: str) -> bool:
+    """Whether a world, or what `family` says of it, is a sample."""
+    return re.match(r"random-\d", scenario) is not None
 
 
 def in_family(summary: pd.DataFrame, scenario: str) -> pd.DataFrame:
@@ -195,14 +201,20 @@ def _pivot(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def unit_of(values: pd.DataFrame) -> str:
-    """What is drawn from a table of `robots`: "seed" or "speed"."""
-    return "seed" if len(values) >= LEAST_UNITS else "speed"
+    """What is drawn from a table of `robots`: "world", "seed" or "speed"."""
+    worlds = values.index.unique("scenario") if "scenario" in values.index.names else values.index
+    several, units = len(worlds) > 1, len(worlds) if len(worlds) > 1 else len(values)
+    if units < LEAST_UNITS:
+        return "speed"
+    return "world" if several else "seed"
 
 
 def _by_unit(values: pd.DataFrame) -> tuple[Array, str]:
     """Mean of each unit, and what the unit is; units without any value are left out."""
     unit = unit_of(values)
-    means = values.mean(axis="columns" if unit == "seed" else "index").to_numpy(dtype=float)
+    if unit == "world":
+        values = values.groupby(level="scenario", sort=False).mean()
+    means = values.mean(axis="index" if unit == "speed" else "columns").to_numpy(dtype=float)
     return means[~np.isnan(means)], unit
 
 

@@ -8,10 +8,16 @@ from typing import Any
 from .._state import known_name
 from .experiment import Experiment
 from .mismatch import MISMATCHES
+from .scenario import random_scenarios
 
 SUITES: Mapping[str, Mapping[str, Any]] = {
     "default": {},
     "mismatch": {"scenarios": MISMATCHES},
+    "sampled": {
+        "speeds": (-0.4, 0.0, 0.4, 0.8),
+        "controllers": ("pd", "model", "ilc"),
+        "scenarios": tuple(scenario.name for scenario in random_scenarios(20, seed=0)),
+    },
     "control": {
         "speeds": (-0.3, 0.0, 0.3, 0.6),
         "controllers": ("pd", "ilc", "ilc-zero", "model"),
@@ -20,7 +26,8 @@ SUITES: Mapping[str, Mapping[str, Any]] = {
     "paper": {"controllers": ("pd", "ilc", "ilc-paper"), "seeds": tuple(range(5))},
 }
 """What each differs in from `Experiment()`: the paper's speeds under five controllers; the same in
-every world of the list of mismatches; the control arm, which must show nothing; Table I with
+every world of the list of mismatches; practice against the model in 20 sampled worlds, at four
+speeds only, as the worlds are the sample; the control arm, which must show nothing; Table I with
 intervals over seeds, and with the paper's own learning law."""
 
 

@@ -13,6 +13,7 @@ from ..robot import JOINTS
 from .metrics import reduction
 from .paper import table_1
 from .practice import RIVAL, beaten
+from .scenario import load_scenario
 from .statistics import (
     Interval,
     compare_controllers,
@@ -28,6 +29,52 @@ SHOWN = ("calf", "thigh")
 
 _MOVING = 0.05
 """Speed from which on a robot goes somewhere, so that its transport has a cost [m/s]."""
+
+
+WORLD = {
+    "payload": ("payload [kg]", 1.0, ".1f"),
+    "torque_constant": ("torque given", 1.0, ".0%"),
+    "armature": ("rotor [g m²]", 1e3, ".1f"),
+    "damping": ("damping [N m s/rad]", 1.0, ".2f"),
+    "coulomb": ("Coulomb friction [N m]", 1.0, ".2f"),
+    "ground_time_constant": ("contact [ms]", 1e3, ".1f"),
+    "ground_friction": ("ground friction", 1.0, ".2f"),
+    "slope": ("slope [rad]", 1.0, "+.3f"),
+}
+"""What is drawn of a sampled world and matters to every base: column, factor of it, format."""
+
+
+def sampled_worlds(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
+    """Each sampled world of a family: what it is like, and the mean errors in it.
+
+    Means are over the robots that did not fall.
+
+    Args:
+        summary: See `compare.metrics`.
+        scenario: The family.
+
+    Returns:
+        Rows by world, from the one in which practice (`ilc`) leaves the smallest calf error to the
+        one with the largest; columns ("world", attribute of `Scenario`), ("calf" and "thigh",
+        controller) [rad] and ("fallen", controller).
+    """
+    mine = in_family(summary, scenario)
+    controllers = list(dict.fromkeys(mine["controller"]))
+    columns: dict[tuple[str, str], Any] = {}
+    worlds = {name: load_scenario(name) for name in mine["scenario"].unique()}
+    for attribute in WORLD:
+        columns["world", attribute] = pd.Series(
+            {name: getattr(world, attribute) for name, world in worlds.items()}
+        )
+    for joint, name in itertools.product(SHOWN, controllers):
+        peaks = robots(mine, scenario=scenario, controller=name, joint=joint)
+        columns[joint, name] = peaks.groupby(level="scenario").mean().mean(axis="columns")
+    for name in controllers:
+        up = robots(mine, scenario=scenario, controller=name, metric="upright", joint="-")
+        columns["fallen", name] = (up == 0.0).sum(axis="columns").groupby(level="scenario").sum()
+    table = pd.DataFrame(columns).rename_axis("scenario")
+    order = ("calf", "ilc") if "ilc" in controllers else ("calf", controllers[0])
+    return table.sort_values(order)
 
 
 def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
@@ -73,6 +120,7 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     - `j_reduction`: of the mean peak against PD's, with interval;
     - `j_model`: 1 where it is better than the model's feedforward beyond doubt, -1 where it is
       worse, 0 where the interval of the difference holds 0;
+    - `j_difference`: of the mean peak from the model's, pair by pair [rad], with interval;
     - `j_wins`: share of the robots that have a smaller error than with the model, with interval;
     - `beat_strides`, `beat`, `learners`: strides of learning until calf and thigh beat the model
       (median over the robots that do), how many do, of how many;
@@ -121,6 +169,7 @@ def _row(summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[s
         if RIVAL in rivals:
             found = compare_controllers(summary, **mine, against=RIVAL, joint=joint)
             row[f"{joint}_model"] = {True: 1, None: 0, False: -1}[found.better]
+            row |= _interval(f"{joint}_difference", found.difference)
             row |= _interval(f"{joint}_wins", found.improvement)
     settled = summary[(summary["controller"] == controller) & (summary["joint"] == "-")]
     settled = settled[settled["metric"] == "strides_to_converge"]["value"]

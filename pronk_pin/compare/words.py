@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
 
-from .statistics import CONFIDENCE, control_arm, family
-from .tables import SHOWN, answer, beside_the_paper, overview, worst_reduction
+from .statistics import CONFIDENCE, control_arm, family, in_family
+from .tables import (
+    SHOWN,
+    answer,
+    beside_the_paper,
+    overview,
+    sampled_worlds,
+    worst_reduction,
+)
 
 LEARNER = "ilc"
 """Practice, when it is asked whether it beats the model."""
@@ -30,6 +37,8 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
     if not {"pd", LEARNER} <= set(table.index):
         return ""
     practice = table.loc[LEARNER]
+    if practice["unit"] == "world":
+        return _sampled_verdict(summary, scenario, table)
     worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
     less = " and ".join(
         f"{_percent(practice, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
@@ -47,6 +56,59 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
         sentences.append(_against_the_model(practice, table.loc["model"]))
     sentences += [_fallen(table), _control_arm(summary)]
     return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _sampled_verdict(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) -> str:
+    """The answer for a family of sampled worlds, each of which counts once."""
+    practice, drawn = table.loc[LEARNER], in_family(summary, scenario)
+    worlds, speeds = drawn["scenario"].nunique(), drawn["speed"].nunique()
+    worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
+    less = " and ".join(
+        f"{_percent(practice, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
+    )
+    sentences = [
+        f"In {worlds} sampled worlds, at {_count(speeds, 'speed')} in each, practice cuts the mean "
+        f"peak error by {less} against PD ({worst['calf']:.0%} and {worst['thigh']:.0%} for the "
+        "worst robot)."
+    ]
+    if "model" in table.index:
+        sentences += _against_the_model_by_world(summary, scenario, table)
+    sentences += [_fallen(table), _control_arm(summary)]
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _against_the_model_by_world(
+    summary: pd.DataFrame, scenario: str, table: pd.DataFrame
+) -> Iterator[str]:
+    practice, model = table.loc[LEARNER], table.loc["model"]
+    by_world = sampled_worlds(summary, scenario=scenario)
+    signs = [int(practice[f"{joint}_model"]) for joint in SHOWN]
+    if set(signs) == {1}:
+        yield "It beats the model's feedforward in calf and thigh beyond doubt."
+    else:
+        said = {1: "beats", 0: "cannot be told from", -1: "does worse than"}
+        parts = [
+            f"{said[s]} the model's feedforward in the {j}"
+            for j, s in zip(SHOWN, signs, strict=True)
+        ]
+        yield f"It {' and '.join(parts)}."
+    for joint in SHOWN:
+        change, low, high = (
+            1e3 * practice[f"{joint}_difference{end}"] for end in ("", "_low", "_high")
+        )
+        ahead = int((by_world[joint, LEARNER] < by_world[joint, "model"]).sum())
+        yield (
+            f"The {joint}'s mean peak is {1e3 * practice[joint]:.1f} against "
+            f"{1e3 * model[joint]:.1f} mrad, by paired differences {change:+.1f} mrad ({low:+.1f} "
+            f"to {high:+.1f}); it is less in {ahead} of {len(by_world)} worlds, and the "
+            f"probability that a robot improves is {_percent(practice, f'{joint}_wins')}."
+        )
+    if practice["beat"] > 0:
+        yield (
+            f"{practice['beat']:.0f} of {practice['learners']:.0f} robots come to beat the model "
+            "in both joints and stay there, after "
+            f"{practice['beat_strides']:.0f} strides in the median."
+        )
 
 
 def _against_the_model(practice: pd.Series, model: pd.Series) -> str:

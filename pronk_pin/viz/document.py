@@ -28,7 +28,8 @@ nav { font-size: 13px; columns: 2; margin: 1rem 0; } nav a { display: block; col
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 13px; }
 table { margin: .6rem 0; }
 th, td { padding: .15rem .6rem; text-align: right; } td { white-space: nowrap; }
-th:first-child, .left td { text-align: left; } .left td { white-space: normal; }
+tbody th { white-space: nowrap; } th:first-child, .left td { text-align: left; }
+.left td { white-space: normal; }
 thead th { border-bottom: 1px solid #888; } tbody { border-bottom: 1px solid #888; }
 .verdict { background: #eef4fa; border-left: 4px solid #0072B2; padding: .6rem 1rem; }
 figure { margin: 1rem 0; } img { max-width: 100%; }

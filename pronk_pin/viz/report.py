@@ -17,9 +17,9 @@ from matplotlib.figure import Figure
 from ..compare import ForeignRobot, Results
 from ..compare.limits import limitations
 from ..compare.practice import RIVAL, VARIABLES, Practice, practice
-from ..compare.statistics import CONFIDENCE, LEAST_UNITS, family
+from ..compare.statistics import CONFIDENCE, LEAST_UNITS, family, sampled
 from ..compare.suites import SUITES, load_suite
-from ..compare.tables import SHOWN, answer, beside_the_paper
+from ..compare.tables import SHOWN, WORLD, answer, beside_the_paper, sampled_worlds
 from ..compare.words import (
     LEARNER,
     against_model,
@@ -34,7 +34,7 @@ from ..errors import cannot_write
 from ..parity import Parity, Row, format_value, merged
 from . import figures, suite_figures
 from .document import Document
-from .style import save_figure
+from .style import in_order, save_figure
 
 SHOWN_SPEED = 0.3
 """Speed of the tracking figure [m/s]: the paper's."""
@@ -50,18 +50,20 @@ _CAPTIONS = {
     "torques": "Torque library: the learned feedforward, averaged over the last 30 strides "
     "(the paper's Fig. 4).",
     "surface": "The same torques over speed and phase.",
+    "by-world": "Mean peak stance error in each sampled world, from the one in which practice "
+    "leaves the least of the calf's error to the one with the most.",
     "difference": "What practice adds to the model: learned minus the model's feedforward torque.",
 }
 
 _READING = (
     "Errors are peaks of the joint angle's error in stance, means over legs, the last 30 strides "
     f"and the robots that did not fall. Intervals hold {CONFIDENCE:.0%} (BCa bootstrap). The unit "
-    f"that is drawn is the seed with its sampled world, or the speed where there are fewer than "
-    f"{LEAST_UNITS} of them. A controller is better or worse than the model where the interval of "
-    "the paired difference excludes 0, else the matter is open. Wins are the share of the robots "
-    "whose error is smaller than the same robot's with the model (Wilson interval). The model is "
-    "beaten at the first stride below its level from which on the mean over five strides stays "
-    "below, in calf and thigh."
+    "that is drawn is the sampled world, or the seed in a world that is not sampled, or the speed "
+    f"where there are fewer than {LEAST_UNITS} of them. A controller is better or worse than the "
+    "model where the interval of the paired difference excludes 0, else the matter is open. Wins, "
+    "or the probability of improvement, are the share of the robots whose error is smaller than "
+    "the same robot's with the model (Wilson interval). The model is beaten at the first stride "
+    "below its level from which on the mean over five strides stays below, in calf and thigh."
 )
 
 
@@ -158,6 +160,9 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     found = scenario_figures(results, results.experiment.scenarios[0])
     if len(families(results.experiment.scenarios)) > 1:
         found |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
+    for world in filter(sampled, families(results.experiment.scenarios)):
+        table = sampled_worlds(results.summary(), scenario=world)
+        found[f"{world}-by-world"] = suite_figures.by_world(table)
     return [
         save_figure(figure, folder / f"{name}.{suffix}")
         for name, figure in found.items()
@@ -181,24 +186,29 @@ def _suite_figures(
 ) -> dict[str, tuple[Figure, str]]:
     """Figures over all worlds with their captions."""
     table = answer(results.summary()) if table is None else table
+    return {
+        "heat-map": (
+            suite_figures.heat_map(table),
+            "Mean peak stance error by world and controller, in milliradians.",
+        ),
+        **_practice_figures(results),
+    }
+
+
+def _practice_figures(results: Results) -> dict[str, tuple[Figure, str]]:
+    """Practice over its strides in every world, with captions."""
     practised: dict[str, list[Practice]] = {}
     for cell in results.experiment.cells():
         one = practice(results.strides(cell, VARIABLES))
         practised.setdefault(family(cell.scenario), []).append(one)
     ordered = {name: practised[name] for name in families(results.experiment.scenarios)}
     return {
-        "heat-map": (
-            suite_figures.heat_map(table),
-            "Mean peak stance error by world and controller, in milliradians.",
-        ),
-        **{
-            f"practice-{joint}": (
-                suite_figures.practice_curves(ordered, joint=joint),
-                f"The {joint}'s peak error over the strides of learning, with the levels of PD "
-                "and of the model's feedforward; bands from the first to the third quartile.",
-            )
-            for joint in SHOWN
-        },
+        f"practice-{joint}": (
+            suite_figures.practice_curves(ordered, joint=joint),
+            f"The {joint}'s peak error over the strides of learning, with the levels of PD "
+            "and of the model's feedforward; bands from the first to the third quartile.",
+        )
+        for joint in SHOWN
     }
 
 
@@ -230,13 +240,17 @@ def _world(
 ) -> None:
     """The section about one world; the first one has all figures."""
     worlds = families(results.experiment.scenarios)
-    document.heading(f"Controllers in the world `{world}`".replace("`", '"'), world)
+    drawn = [name for name in results.experiment.scenarios if family(name) == world]
+    where = f"{len(drawn)} sampled worlds" if sampled(world) else "world"
+    document.heading(f'Controllers in the {where} "{world}"', world)
     if len(worlds) > 1:
         document.text(verdict(summary, scenario=world, table=table.loc[world]))
     document.table(_errors(table.loc[world]))
     document.table(_motion(table.loc[world]))
     units = sorted(set(table.loc[world]["unit"]))
     document.text(f"Intervals are drawn over the {' and '.join(units)}s.", "note")
+    if sampled(world):
+        _sampled(document, results, summary, world)
     if world != worlds[0] or world not in results.experiment.scenarios:
         return
     found = scenario_figures(results, world)
@@ -320,6 +334,38 @@ def _differing(differences: Sequence[Row]) -> pd.DataFrame:
         for row in merged(differences)
     ]
     return pd.DataFrame(rows).set_index("")
+
+
+def _sampled(document: Document, results: Results, summary: pd.DataFrame, world: str) -> None:
+    """What the worlds of a family are like, and what comes out in each."""
+    table = sampled_worlds(summary, scenario=world)
+    document.heading("World by world", f"{world}-each", level=3)
+    document.picture(f"{world}-by-world", suite_figures.by_world(table), _CAPTIONS["by-world"])
+    document.text(
+        "What is drawn of each world, and the mean peaks in it in milliradians, over the robots "
+        "that did not fall; in the order of the figure."
+    )
+    document.table(_each_world(table))
+    if len(families(results.experiment.scenarios)) > 1:
+        return  # practice has its figures for all worlds
+    for name, (figure, caption) in _practice_figures(results).items():
+        document.picture(name, figure, caption)
+
+
+def _each_world(table: pd.DataFrame) -> pd.DataFrame:
+    """The table of `sampled_worlds` as texts."""
+    shown = {}
+    for attribute, (label, factor, form) in WORLD.items():
+        shown[label] = [number(factor * value, form) for value in table["world", attribute]]
+    for joint in SHOWN:
+        for controller in in_order(table[joint].columns):
+            label = f"{joint}: {figures.LABELS.get(controller, controller)}"
+            shown[label] = [number(1e3 * value, ".1f") for value in table[joint, controller]]
+    if table["fallen"].to_numpy().any():
+        for controller in table["fallen"].columns:
+            label = f"fell: {figures.LABELS.get(controller, controller)}"
+            shown[label] = [f"{count:.0f}" for count in table["fallen", controller]]
+    return pd.DataFrame(shown, index=table.index.rename(None))
 
 
 def _errors(table: pd.DataFrame) -> pd.DataFrame:

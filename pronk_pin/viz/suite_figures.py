@@ -107,6 +107,32 @@ def practice_curves(practised: Mapping[str, list[Practice]], *, joint: str) -> F
     return figure
 
 
+@styled
+def by_world(table: pd.DataFrame) -> Figure:
+    """Mean peak error in each sampled world, one line a world and one panel a joint.
+
+    Args:
+        table: `compare.tables.sampled_worlds`.
+    """
+    controllers = in_order(table["calf"].columns)
+    figure = new_figure(TWO_COLUMNS, 0.9 + 0.14 * len(table))
+    panels = figure.subplots(1, len(SHOWN), sharey=True)
+    rows = np.arange(len(table))
+    for axes, joint in zip(panels, SHOWN, strict=True):
+        errors = table[joint]
+        axes.hlines(rows, errors.min(axis=1), errors.max(axis=1), color="0.8", lw=0.8)
+        for controller in controllers:
+            style = look(controller)
+            axes.plot(errors[controller], rows, style.marker, color=style.color, label=style.label)
+        axes.set_xscale("log")
+        axes.set_title(joint)
+        axes.set_xlabel("mean peak stance error [rad]")
+    panels[0].set_yticks(rows, table.index)
+    panels[0].invert_yaxis()
+    legend_below(figure, *panels[0].get_legend_handles_labels())
+    return figure
+
+
 def _draw(axes: Axes, simulations: list[Practice], joint: int, controller: str) -> object:
     """One controller: a curve if it learns, a level if it is PD or the model."""
     style = look(controller)

@@ -17,6 +17,7 @@ from pronk_pin.compare.statistics import (
     family,
     mean_interval,
     robots,
+    sampled,
 )
 
 
@@ -136,10 +137,33 @@ def test_few_seeds_are_no_sample_and_the_speeds_are_drawn_instead() -> None:
         assert compare_pairs(values, values + 0.1).unit == unit
 
 
+def test_more_seeds_in_a_sampled_world_are_no_more_worlds() -> None:
+    """The world scatters, its seeds do not: more of them must not make it sure."""
+    rng = np.random.default_rng(9)
+    worlds = [f"random-0-{k}" for k in range(8)]
+    drawn = np.repeat(rng.normal(1.0, 0.5, (8, 1)), 3, axis=1)
+    once = pd.concat(
+        [table(row[None], scenario=name) for name, row in zip(worlds, drawn, strict=True)]
+    )
+    often = pd.concat(
+        [
+            table(np.tile(row, (10, 1)), scenario=name)
+            for name, row in zip(worlds, drawn, strict=True)
+        ]
+    )
+    assert tuple(mean_interval(often)) == pytest.approx(tuple(mean_interval(once)), rel=5e-3)
+    assert compare_pairs(often, often + 1.0).unit == "world"
+    four = often.loc[worlds[:4]]
+    assert compare_pairs(four, four + 1.0).unit == "speed"  # too few worlds, however many seeds
+
+
 def test_sampled_worlds_are_one_family() -> None:
     assert family("random-3-0") == family("random-3-12") == "random-3"
     assert family("random-3-0+delay") == "random-3+delay"
     assert family("payload=2+slope") == "payload=2+slope"
+    assert sampled("random-3-0")
+    assert sampled(family("random-3-0+delay"))
+    assert not sampled("payload=2+slope")
 
 
 def test_the_same_numbers_come_out_each_time() -> None:

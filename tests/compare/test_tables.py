@@ -4,7 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pronk_pin.compare.tables import answer, beside_the_paper, overview, worst_reduction
+from pronk_pin.compare import random_scenarios
+from pronk_pin.compare.tables import (
+    answer,
+    beside_the_paper,
+    overview,
+    sampled_worlds,
+    worst_reduction,
+)
 
 
 def test_our_errors_stand_beside_the_papers_at_the_same_speed(summary: pd.DataFrame) -> None:
@@ -55,6 +62,7 @@ def test_who_beats_the_model_is_counted_robot_by_robot(summary: pd.DataFrame) ->
     ilc = overview(summary, scenario="nominal").loc["ilc"]
     assert (ilc["calf_model"], ilc["thigh_model"]) == (1, -1)
     assert (ilc["calf_wins"], ilc["thigh_wins"]) == (1.0, 0.0)
+    assert ilc["calf_difference"] == pytest.approx(-0.015)
     assert ilc["calf_wins_low"] < 0.5  # two robots prove little
     assert (ilc["beat_strides"], ilc["beat"], ilc["learners"]) == (3.0, 1, 2)
 
@@ -72,4 +80,23 @@ def test_the_answer_has_every_world_and_sampled_ones_as_one(summary: pd.DataFram
     table = answer(pd.concat([summary, *sampled]))
     assert list(table.index.get_level_values("scenario").unique()) == ["nominal", "random-4"]
     assert table.loc[("random-4", "ilc"), "robots"] == 10
-    assert table.loc[("random-4", "ilc"), "unit"] == "seed"
+    assert table.loc[("random-4", "ilc"), "unit"] == "world"
+
+
+def test_each_sampled_world_stands_beside_what_it_is_like(summary: pd.DataFrame) -> None:
+    down = (summary["controller"] == "ilc") & (summary["metric"] == "upright")
+    worlds = []
+    for k, factor in ((0, 3.0), (1, 1.0)):
+        mine = summary.assign(scenario=f"random-4-{k}")
+        mine.loc[mine["metric"] == "peak_error", "value"] *= factor
+        worlds.append(mine)
+    worlds[0].loc[worlds[0][down & (worlds[0]["speed"] == 0.35)].index, "value"] = 0.0
+    table = sampled_worlds(pd.concat(worlds, ignore_index=True), scenario="random-4")
+    assert table.index.tolist() == ["random-4-1", "random-4-0"]  # by what practice leaves
+    for k, world in enumerate(random_scenarios(2, seed=4)):
+        assert table.loc[f"random-4-{k}", ("world", "payload")] == world.payload
+    assert table.loc["random-4-1", ("calf", "ilc")] == pytest.approx(0.03)
+    assert table.loc["random-4-0", ("calf", "ilc")] == pytest.approx(0.06)  # one fell
+    assert table.loc["random-4-0", ("thigh", "pd")] == pytest.approx(3 * 0.075)
+    assert table["fallen", "ilc"].tolist() == [0, 1]
+    assert table["fallen", "pd"].tolist() == [0, 0]

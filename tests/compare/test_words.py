@@ -80,3 +80,30 @@ def test_one_world_alone_needs_no_verdict_over_all_without_the_model(
 ) -> None:
     assert suite_verdict(summary[summary["controller"] != "model"]) == ""
     assert np.isfinite(summary["value"].dropna()).all()
+
+
+def test_of_sampled_worlds_each_counts_once(summary: pd.DataFrame) -> None:
+    worlds = [summary.assign(scenario=f"random-4-{k}") for k in range(6)]
+    odd = (worlds[0]["controller"] == "ilc") & (worlds[0]["joint"] == "calf")
+    worlds[0].loc[odd & (worlds[0]["metric"] == "peak_error"), "value"] = 0.2
+    words = verdict(pd.concat(worlds, ignore_index=True), scenario="random-4")
+    assert words.startswith("In 6 sampled worlds, at 2 speeds in each, practice cuts the mean peak")
+    assert "for the worst robot)" in words
+    # calf: better but for the odd world, so open; thigh: worse everywhere
+    assert "It cannot be told from the model's feedforward in the calf and does worse than" in words
+    assert "less in 5 of 6 worlds, and the probability that a robot improves is 83% (" in words
+    assert "by paired differences +7.5 mrad (+7.5 to +7.5); it is less in 0 of 6 worlds" in words
+    assert "6 of 12 robots come to beat the model in both joints and stay there" in words
+
+
+def test_practice_that_wins_in_every_sampled_world_does_so_beyond_doubt(
+    summary: pd.DataFrame,
+) -> None:
+    thigh = (summary["controller"] == "model") & (summary["joint"] == "thigh")
+    summary.loc[thigh, "value"] *= 10.0
+    worlds = pd.concat([summary.assign(scenario=f"random-4-{k}") for k in range(6)])
+    words = verdict(worlds.reset_index(drop=True), scenario="random-4")
+    assert "It beats the model's feedforward in calf and thigh beyond doubt." in words
+    text = format_tables(worlds.reset_index(drop=True), scenario="random-4")
+    assert "intervals over the worlds" in text
+    assert "nan" not in text

@@ -14,11 +14,18 @@ import pytest
 
 from pronk_pin import Robot, cli
 from pronk_pin._urdf import mujoco_spec
-from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
+from pronk_pin.compare import (
+    Experiment,
+    Results,
+    Schedule,
+    random_scenarios,
+    run_experiment,
+)
 from pronk_pin.compare.limits import limitations
+from pronk_pin.compare.statistics import family
 from pronk_pin.compare.suites import SUITES, load_suite
 from pronk_pin.errors import FileProblem
-from pronk_pin.viz.report import command, write_report
+from pronk_pin.viz.report import command, write_figures, write_report
 
 EXPERIMENT = Experiment(
     speeds=(0.0, 0.4),
@@ -154,3 +161,35 @@ def test_a_command_of_many_lines_can_be_pasted(result: Results) -> None:
     assert block is not None
     assert "\n" in block[1]
     assert shlex.split(block[1].replace("\\\n", " ")) == shlex.split(command(result))
+
+
+def test_sampled_worlds_are_one_family_and_each_has_its_line(tmp_path: Path) -> None:
+    names = tuple(world.name for world in random_scenarios(5, seed=2))
+    experiment = replace(
+        EXPERIMENT,
+        speeds=(0.2,),
+        controllers=("pd", "ilc", "model"),
+        scenarios=names,
+        schedule=Schedule(startup=0.2, practice=2.0, learning=2.0),
+    )
+    results = run_experiment(experiment, tmp_path / "result", workers=1, progress=False)
+    write_report(results)
+    text = (results.folder / "report.md").read_text()
+    assert "> In 5 sampled worlds, at 1 speed in each, practice cuts the mean peak error" in text
+    assert 'Controllers in the 5 sampled worlds "random-2"' in text
+    assert "Intervals are drawn over the worlds." in text
+    assert "of the 6 mean errors here" in text
+    for name in names:
+        assert re.search(rf"^\| {name} \| \d", text, re.MULTILINE)
+    for figure in ("random-2-by-world", "practice-calf", "practice-thigh"):
+        assert (results.folder / "figures" / f"{figure}.svg").stat().st_size > 1000
+    assert not re.search(r"\bnan\b", text)
+    written = {path.name for path in write_figures(results, tmp_path / "figures")}
+    assert "random-2-by-world.pdf" in written
+
+
+def test_the_suite_of_sampled_worlds_is_a_sample() -> None:
+    experiment = load_suite("sampled")
+    assert len(experiment.scenarios) == 20
+    assert {"pd", "ilc", "model"} <= set(experiment.controllers)
+    assert {family(name) for name in experiment.scenarios} == {"random-0"}
