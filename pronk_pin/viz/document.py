@@ -29,7 +29,7 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size
 table { margin: .6rem 0; }
 th, td { padding: .15rem .6rem; text-align: right; } td { white-space: nowrap; }
 tbody th { white-space: nowrap; } th:first-child, .left td { text-align: left; }
-.left td { white-space: normal; }
+.left td, .wrap td { white-space: normal; }
 thead th { border-bottom: 1px solid #888; } tbody { border-bottom: 1px solid #888; }
 .verdict { background: #eef4fa; border-left: 4px solid #0072B2; padding: .6rem 1rem; }
 figure { margin: 1rem 0; } img { max-width: 100%; }
@@ -64,6 +64,7 @@ class _Bullets:
 class _Table:
     cells: pd.DataFrame
     left: bool
+    wrap: bool
 
 
 @dataclass(frozen=True)
@@ -101,9 +102,15 @@ class Document:
         """A list."""
         self._blocks.append(_Bullets(tuple(items)))
 
-    def table(self, cells: pd.DataFrame, *, left: bool = False) -> None:
-        """A table of texts, with its index as the first column; `left` for words, not numbers."""
-        self._blocks.append(_Table(cells, left))
+    def table(self, cells: pd.DataFrame, *, left: bool = False, wrap: bool = False) -> None:
+        """A table of texts, with its index as the first column.
+
+        Args:
+            cells: The texts.
+            left: Words rather than numbers, without a header.
+            wrap: Break long cells, rather than let the table become wider than the page.
+        """
+        self._blocks.append(_Table(cells, left, wrap))
 
     def picture(self, name: str, figure: Figure, caption: str) -> None:
         """A figure; the name is that of its file beside a Markdown document."""
@@ -152,7 +159,7 @@ def _html(block: _Heading | _Text | _Bullets | _Table | _Picture) -> str:
     if isinstance(block, _Bullets):
         return "<ul>" + "".join(f"<li>{_inline(item)}</li>" for item in block.items) + "</ul>"
     if isinstance(block, _Table):
-        kind = "table left" if block.left else "table"
+        kind = "table" + " left" * block.left + " wrap" * block.wrap
         table = block.cells.to_html(border=0, header=not block.left)
         return f'<div class="{kind}">{table}</div>'
     data = base64.b64encode(block.svg).decode()

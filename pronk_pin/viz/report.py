@@ -296,7 +296,12 @@ def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
     else:
         document.table(_dynamics(parity))
     if parity.differences:
-        document.table(_differing(parity.differences))
+        document.text(
+            "Links and joints go by the joint that moves them. An inertia is (xx, yy, zz, xy, xz, "
+            "yz) about the centre of mass, in the trunk's axes at zero joint angles.",
+            "note",
+        )
+        document.table(_differing(parity.differences), wrap=True)
     actuators = sorted({str(row.b) for row in parity.rows if row.what == "actuator"} - {"motor"})
     if actuators:
         document.text(
@@ -322,18 +327,21 @@ def _dynamics(parity: Parity) -> pd.DataFrame:
 
 
 def _differing(differences: Sequence[Row]) -> pd.DataFrame:
-    """Rows of a parity table, those that say the same of several joints as one."""
-    rows = [
+    """Rows of a parity table by quantity, those that say the same of several joints as one."""
+    quantities = list(dict.fromkeys(row.what for row in differences))
+    rows = sorted(merged(differences), key=lambda row: quantities.index(row.what))
+    cells = [
         {
-            "": f"{row.what}" + (f" [{row.unit}]" if row.unit else ""),
             "where": row.where,
             "model": format_value(row.a),
             "simulated": format_value(row.b),
             "difference": number(row.difference, ".3g"),
         }
-        for row in merged(differences)
+        for row in rows
     ]
-    return pd.DataFrame(rows).set_index("")
+    units = [f" [{row.unit}]" if row.unit else "" for row in rows]
+    index = [row.what + unit for row, unit in zip(rows, units, strict=True)]
+    return pd.DataFrame(cells, index=index)
 
 
 def _sampled(document: Document, results: Results, summary: pd.DataFrame, world: str) -> None:
