@@ -19,6 +19,7 @@ COLORS = {
     "load": "#E69F00",
     "weak motors": "#D55E00",
     "delay": "#CC79A7",
+    "gravity": "#5C3A21",
     "deviation": "#999999",
     "internal forces": "#DDDDDD",
     "unexplained": "#F0E442",

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pandas as pd
 import pinocchio as pin
 import pytest
 import xarray as xr
@@ -24,6 +25,7 @@ from pronk_pin.compare import (
     Simulation,
     describe,
     explain,
+    random_scenarios,
     run_experiment,
 )
 from pronk_pin.compare.closing import close_loop, format_loop
@@ -325,6 +327,32 @@ def test_a_slope_is_reported_and_not_taken_for_friction() -> None:
         assert table.loc[name, "estimate"] == pytest.approx(table.loc[name, "true"], rel=0.15)
 
 
+def test_a_slope_along_which_the_trunk_is_held_is_felt_and_not_taken_for_friction() -> None:
+    world = dataclasses.replace(COMBINED, name="slope", slope=0.05)
+    found = explain_noisy(practise(world))
+    assert found.ground.slope == pytest.approx(0.05, abs=0.002)
+    assert "the ground rises by 2.9 degrees" in " ".join(words(found))
+    assert not foreign(found)
+    table = found.table()
+    for name in ("thigh armature", "calf armature", "thigh Coulomb", "calf Coulomb", "payload"):
+        assert table.loc[name, "estimate"] == pytest.approx(table.loc[name, "true"], rel=0.06), name
+    # The slope's part of the weight, borne by four legs of which each knee carries its share.
+    level = explain_noisy(practise(COMBINED))
+    share = {one: one.share_table.sel(part="stance", cause="gravity") for one in (found, level)}
+    assert abs(float(share[found].sel(joint="thigh"))) > 0.1
+    assert float(np.abs(share[level]).max()) < 0.01
+
+
+def test_another_gravity_is_felt_and_not_taken_for_load() -> None:
+    world = dataclasses.replace(SCENARIOS["nominal"], name="moon", gravity=8.8)
+    found = explain_noisy(practise(world))
+    assert found.ground.gravity == pytest.approx(8.8, abs=0.02)
+    assert found.ground.slope == pytest.approx(0.0, abs=0.005)
+    assert "gravity is 8.80 m/s^2, and 9.81 in the model" in " ".join(words(found))
+    assert found.table().loc["payload", "estimate"] == pytest.approx(0.0, abs=0.15)
+    assert "gravity is" not in " ".join(words(explain_noisy(practise(SCENARIOS["nominal"]))))
+
+
 def test_few_strides_at_one_speed_are_called_so(practised: xr.Dataset) -> None:
     little = explain_noisy(practised.isel(speed=[1], last=slice(-3, None)))
     text = " ".join(words(little))
@@ -411,6 +439,23 @@ def test_intervals_hold_the_truth_in_nine_of_ten_random_worlds() -> None:
         seen = table[table["seen"]]
         inside.append(((seen["low"] <= seen["true"]) & (seen["true"] <= seen["high"])).mean())
     assert np.mean(inside) >= 0.9
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_in_sampled_worlds() -> None:
+    """Slopes, soft and slippery ground and a shifted centre of mass, which are none of the terms,
+    do not mislead those that are."""
+    rng, tables = np.random.default_rng(11), []
+    for seed, world in enumerate(random_scenarios(50, seed=0)):
+        strides = practise(world, speeds=(-0.4, -0.1, 0.2, 0.5, 0.8), seed=seed)
+        noisy = with_noise(strides, rng)
+        tables.append(explain(noisy, imu_noise=IMU, rng=rng, draws=200).table())
+    table = pd.concat(tables)
+    table = table[table["seen"]]
+    inside = (table["low"] <= table["true"]) & (table["true"] <= table["high"])
+    assert inside.mean() >= 0.9
+    by_term = inside.groupby(level="term").mean()
+    assert by_term.min() >= 0.8, by_term
 
 
 _NOMINAL = SCENARIOS["nominal"]

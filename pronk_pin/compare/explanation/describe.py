@@ -25,6 +25,8 @@ SINKING = 0.005
 """Depth from which on the ground gives way [m]; a stiff one takes 2.5 mm in a landing."""
 SLOPE = np.radians(1.0)
 """Slope from which on the ground is not level [rad]."""
+GRAVITY = 0.1
+"""Difference from which on gravity is another than the model's [m/s^2]."""
 _INTERNAL = 1.0
 """Torque from which on internal forces are worth a word [N m]."""
 _UNITS = {"x": "N", "z": "N"}
@@ -177,6 +179,12 @@ def _of_the_ground(explanation: Explanation) -> Iterator[str]:
         yield (
             f"Not one of the terms: the ground rises by {np.degrees(ground.slope):.1f} degrees "
             "forwards."
+        )
+    usual = explanation.robot.gravity
+    if abs(ground.gravity - usual) > GRAVITY:
+        yield (
+            f"Not one of the terms: gravity is {ground.gravity:.2f} m/s^2, and {usual:g} in the "
+            "model."
         )
 
 

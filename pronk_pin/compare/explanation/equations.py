@@ -24,6 +24,7 @@ import pinocchio as pin
 import scipy.ndimage
 
 from ..._typing import Array, IntArray
+from ...dynamics import mass_matrix
 from ...kinematics.contacts import jacobian_at
 from ...robot import NB, Robot
 from .recording import PhaseRecording
@@ -56,6 +57,9 @@ class PhaseForces(NamedTuple):
     """What the motors gave beyond what the URDF's motion needs, shape (k, ticks, 18)."""
     columns: Array
     """What a unit of each term makes of it, shape (k, ticks, 18, terms)."""
+    lean: Array
+    """What of that motion's forces is gravity's that pulls otherwise than the model's, mean over
+    the strides, shape (ticks, 18)."""
     balance: Array | None
     """In stance, combinations of the equations that contact forces do not enter, shape
     (k, ticks, 2, 18)."""
@@ -85,7 +89,8 @@ def phase_forces(robot: Robot, phase: PhaseRecording, terms: tuple[Term, ...]) -
     balance = None
     if phase.part == "stance":
         balance = phase.of_ticks(ground_free(robot, motion.q))
-    return PhaseForces(phase, phase.of_ticks(known), phase.of_ticks(columns), balance)
+    lean = phase.of_ticks(_weight(robot, motion.q, phase.lean)).mean(axis=0)
+    return PhaseForces(phase, phase.of_ticks(known), phase.of_ticks(columns), lean, balance)
 
 
 def equations(robot: Robot, phases: tuple[PhaseForces, ...]) -> Equations:
@@ -127,6 +132,13 @@ def forces(robot: Robot, motion: Motion, terms: tuple[Term, ...]) -> tuple[Array
     for out, q, v, a in zip(known, motion.q, motion.v, motion.a, strict=True):
         out -= pin.rnea(model, data, q, v, a)
     return known, np.stack([term.column(robot, motion) for term in terms], axis=-1)
+
+
+def _weight(robot: Robot, q: Array, lean: Array) -> Array:
+    """What it takes to bear the trunk's acceleration along x and z, shape (n, 18)."""
+    if not lean.any():
+        return np.zeros((len(q), robot.nv))
+    return np.array([mass_matrix(robot, each)[:, list(_GUIDED)] @ lean for each in q])
 
 
 def ground_free(robot: Robot, q: Array) -> Array:

@@ -1,4 +1,7 @@
-"""What the standing feet tell of the ground: whether it gives way, and whether it slopes."""
+"""What feet and IMU tell of the ground: whether it gives way, and whether it slopes.
+
+A trunk that is held level climbs a slope; one that is held along it feels gravity lean back.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,9 @@ from ...robot import Robot
 from .recording import PhaseRecording
 
 _SPAN = 0.3
-"""Distance from which on a slope shows [m]."""
+"""Distance from which on a climb shows [m]."""
+_UPRIGHT = 0.005
+"""Angle up to which an IMU's noise may let gravity lean [rad]."""
 
 
 class Ground(NamedTuple):
@@ -21,7 +26,10 @@ class Ground(NamedTuple):
     sinking: float
     """By how much the feet sink in after touchdown [m]."""
     slope: float
-    """Angle by which it rises forwards [rad]; NaN where the robot stayed in one place."""
+    """Angle by which it rises forwards [rad]; NaN where the robot stayed in one place, and gravity
+    stands upright on it."""
+    gravity: float
+    """Gravitational acceleration [m/s^2]."""
 
 
 def survey(robot: Robot, stances: Iterable[PhaseRecording]) -> Ground:
@@ -31,7 +39,7 @@ def survey(robot: Robot, stances: Iterable[PhaseRecording]) -> Ground:
         robot: The robot.
         stances: The stance of each speed.
     """
-    sinking, steps = [], []
+    sinking, steps, lean = [], [], []
     for phase in stances:
         place = np.zeros((*phase.joints.shape[:2], 3))
         place[..., [0, 2]] = phase.base
@@ -40,6 +48,11 @@ def survey(robot: Robot, stances: Iterable[PhaseRecording]) -> Ground:
         sinking.append(height[0] - height.min())
         middle = phase.base[:, phase.base.shape[1] // 2]  # (k, 2): it climbs with the ground
         steps.append(middle - middle.mean(axis=0))
+        lean.append(phase.lean)
     x, z = np.concatenate(steps).T
-    rise = float(x @ z / (x @ x)) if np.ptp(x) > _SPAN else np.nan
-    return Ground(float(np.mean(sinking)), float(np.arctan(rise)))
+    climb = float(np.arctan(x @ z / (x @ x))) if np.ptp(x) > _SPAN else np.nan
+    back, up = np.mean(lean, axis=0) - robot.model.gravity.linear[[0, 2]]
+    leaning = float(np.arctan2(back, up))
+    if np.isnan(climb) and abs(leaning) > _UPRIGHT:
+        climb = 0.0
+    return Ground(float(np.mean(sinking)), climb + leaning, float(np.hypot(back, up)))

@@ -16,7 +16,8 @@ import xarray as xr
 
 from ..._typing import Array
 from ...errors import InvalidInput
-from ...robot import NB, Robot
+from ...robot import NB, Robot, load_robot
+from ..scenario import Scenario
 from .terms import Motion
 
 PARTS = ("stance", "flight")
@@ -41,7 +42,9 @@ class PhaseRecording:
         feedforward: The part of it that was feedforward [N m], shape (k, ticks + 1, 12).
         base: Place of the trunk, x and z [m], shape (k, ticks + 1, 2).
         base_rate: Velocity of the trunk along x and z [m/s], shape (k, ticks + 1, 2).
-        fall: Acceleration of the trunk along x and z as an IMU has it [m/s^2], (k, ticks, 2).
+        fall: Acceleration of the trunk along x and z as an IMU has it [m/s^2], (k, ticks, 2): the
+            specific force that it measures, and the gravity of the model. On a slope, along which
+            the trunk is held, it is not that of the place.
         timestep: [s]
     """
 
@@ -59,6 +62,12 @@ class PhaseRecording:
     def strides(self) -> int:
         """Number of strides."""
         return len(self.joints)
+
+    @property
+    def lean(self) -> Array:
+        """Gravity of the model less that of the world, along x and z [m/s^2], shape (2,)."""
+        moving = np.diff(self.base_rate, axis=1) / self.timestep
+        return np.asarray((self.fall - moving).mean(axis=(0, 1)))
 
     @property
     def ticks(self) -> int:
@@ -113,7 +122,7 @@ def recordings(
         raise InvalidInput(
             "this result has no ticks, which explain reads; run 'pronk-pin compare' again"
         )
-    timestep = float(strides.attrs["timestep"])
+    timestep, lean = float(strides.attrs["timestep"]), _lean(strides)
     found: dict[float, tuple[PhaseRecording, ...]] = {}
     for k, speed in enumerate(strides["speed"].to_numpy()):
         mine = strides.isel(speed=k)
@@ -129,6 +138,7 @@ def recordings(
                 part,
                 int(ticks[whole, column].min()),
                 timestep,
+                lean,
                 imu_noise,
                 rng,
             )
@@ -139,11 +149,22 @@ def recordings(
     return found
 
 
+def _lean(strides: xr.Dataset) -> Array:
+    """What an IMU has besides the acceleration of the place, as the simulated world has it."""
+    model = load_robot(strides.attrs["robot"]).model.gravity.linear
+    try:
+        world = Scenario.from_json(strides.attrs["scenario_parameters"]).gravity_vector
+    except (KeyError, InvalidInput):  # strides of a robot
+        return np.zeros(2)
+    return np.asarray(model - np.array(world))[[0, 2]]
+
+
 def _recording(
     mine: xr.Dataset,
     part: str,
     ticks: int,
     timestep: float,
+    lean: Array,
     imu_noise: float,
     rng: np.random.Generator | None,
 ) -> PhaseRecording:
@@ -152,7 +173,7 @@ def _recording(
         return np.asarray(array[:, :ticks], dtype=float)
 
     base_rate = values("base_rate", "axis")
-    fall = np.diff(base_rate, axis=1) / timestep
+    fall = np.diff(base_rate, axis=1) / timestep + lean
     if imu_noise > 0.0:
         rng = np.random.default_rng() if rng is None else rng
         fall = fall + imu_noise * rng.standard_normal(fall.shape)

@@ -2,14 +2,15 @@
 
 With the mean of the recorded strides, and the model's torque along the reference,
 
-    learned - model = sum of terms + deviation + internal forces + unexplained.
+    learned - model = sum of terms + gravity + deviation + internal forces + unexplained.
 
 Learned is what the motors were told in the end: feedforward, and what is still left to feedback.
+Gravity is what it takes on a slope along which the trunk is held, or where it is not the model's.
 Deviation is what the URDF's robot would need for the measured motion instead of the reference.
 In stance four feet leave ten of the twelve torques to themselves, in that they push the feet
 against each other and the guide: these internal forces make no motion, and no motion tells why they
 are there. What does make motion is in the two other directions, with the least torques: there the
-terms, the deviation and the rest are told apart. In flight nothing is internal.
+terms, gravity, the deviation and the rest are told apart. In flight nothing is internal.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ FRICTION = 0.6
 """Friction coefficient of the model's torques."""
 BOUNCE = 0.03
 """Time after touchdown in which the feet bounce [s]."""
-OTHERS = ("deviation", "internal forces", "unexplained")
+OTHERS = ("gravity", "deviation", "internal forces", "unexplained")
 """Causes that are no terms."""
 
 
@@ -123,23 +124,25 @@ def _apart(
     needed = -known
     needed[:, NB:] += told  # rnea of the URDF
     columns = np.moveaxis(columns, -1, 0)  # (terms, ticks, 18)
+    lean = phase.lean
     if phase.balance is None:
         moving, internal = told, np.zeros_like(told)
-        needed, columns = needed[:, NB:], columns[..., NB:]
+        needed, columns, lean = needed[:, NB:], columns[..., NB:], lean[:, NB:]
     else:
         balance = phase.balance.mean(axis=0)  # (ticks, 2, 18)
         least = np.linalg.pinv(balance[:, :, NB:])  # (ticks, 12, 2)
         motors = np.einsum("tij,tj->ti", balance[:, :, NB:], told)
         moving = np.einsum("tij,tj->ti", least, motors)
         internal = told - moving
-        needed, columns = (
+        needed, columns, lean = (
             np.einsum("tij,tjk,...tk->...ti", least, balance, each, optimize=True)
-            for each in (needed, columns)
+            for each in (needed, columns, lean)
         )
     by_cause = dict.fromkeys(causes, np.zeros_like(told))
     for term, column in zip(terms, columns, strict=True):
         by_cause[term.cause] = by_cause[term.cause] + column
-    by_cause["deviation"] = needed - model
+    by_cause["gravity"] = lean
+    by_cause["deviation"] = needed - lean - model
     by_cause["internal forces"] = internal
     by_cause["unexplained"] = moving - needed - columns.sum(axis=0)
     spread = recording.torque[:, :-1].std(axis=0)
