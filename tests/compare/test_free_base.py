@@ -101,14 +101,33 @@ def test_an_unknown_base_is_refused_with_the_known_ones() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("base", BASES)
-def test_at_all_speeds_robots_stay_up_for_half_a_minute_and_learning_halves_their_peak_errors(
+def test_at_all_speeds_robots_stay_up_and_straight_on_the_models_feedforward(base: str) -> None:
+    strides = pronked(base, "model", 30.0, 0.0)
+    assert finished(strides, "upright").min() == 1.0
+    assert np.degrees(np.abs(finished(strides, "heading")).max()) < 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("base", BASES)
+def test_learning_halves_the_errors_at_all_speeds_of_robots_whose_trunks_may_turn(
     base: str,
 ) -> None:
+    before, after = pronked(base, "pd", 10.0, 0.0), pronked(base, "ilc", 10.0, 30.0)
+    assert finished(after, "upright").min() == 1.0
+    assert np.degrees(np.abs(finished(after, "heading")).max()) < 5.0
+    for name in ("peak_error", "rms_error"):
+        for joint in ("thigh", "calf"):
+            ratio = last_strides(after, name, joint) / last_strides(before, name, joint)
+            assert ratio.max() < 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("base", BASES)
+def test_learning_on_top_of_the_model_halves_its_peak_errors(base: str) -> None:
     plain, learned = pronked(base, "model", 30.0, 0.0), pronked(base, "model+ilc", 10.0, 20.0)
-    for strides in (plain, learned):
-        assert finished(strides, "upright").min() == 1.0
-        assert np.degrees(np.abs(finished(strides, "heading")).max()) < 5.0
-    # The thigh's root mean square falls less: a part of the pitch error stays, see docs.
+    assert finished(learned, "upright").min() == 1.0
+    assert np.degrees(np.abs(finished(learned, "heading")).max()) < 5.0
+    # The thigh's root mean square falls less: from 0.6 m/s on the trunk's pitch wanders, see docs.
     for name, joint in (("peak_error", "thigh"), ("peak_error", "calf"), ("rms_error", "calf")):
         before, after = last_strides(plain, name, joint), last_strides(learned, name, joint)
         assert after.mean() < 0.5 * before.mean()
