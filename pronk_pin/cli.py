@@ -30,6 +30,7 @@ from .compare.gains import describe_gains, sweep_gains
 from .compare.prediction import compare_prediction, describe_prediction, practise
 from .compare.reproduce import format_reproduction
 from .compare.scenario import load_scenario
+from .compare.seeding import describe_seeding, measure_seeding
 from .compare.suites import SUITES, load_suite
 from .compare.transfer import describe_transfers, measure_transfers
 from .compare.words import families, format_suite, format_tables
@@ -50,7 +51,7 @@ from .robot import load_robot
 from .viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
 from .viz.explanation_figure import write_explanation_figure
 from .viz.gait_figures import write_gait_figures
-from .viz.learning_figures import write_prediction
+from .viz.learning_figures import write_prediction, write_seeding
 from .viz.practice import practice_programme
 from .viz.report import write_figures, write_report
 
@@ -483,6 +484,29 @@ class Transfer:
 
 
 @dataclass(frozen=True)
+class Seeding:
+    """Tell what a seed saves: learning from nothing, from the model, and from neighbouring speeds.
+
+    The torque library practises at all speeds; each inner one begins with its neighbours' torques.
+    """
+
+    speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+    """Speeds [m/s], increasing."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("seeding.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        table = measure_seeding(self.speed, load_scenario(self.scenario), robot=self.robot)
+        print(describe_seeding(table))
+        print(f"figure  {write_seeding(table, self.figure)}")
+
+
+@dataclass(frozen=True)
 class Ilc:
     """Analyse learning laws, and what learning is good for."""
 
@@ -490,6 +514,7 @@ class Ilc:
         Annotated[Analyze, subcommand("analyze")]
         | Annotated[Gains, subcommand("gains")]
         | Annotated[Transfer, subcommand("transfer")]
+        | Annotated[Seeding, subcommand("seeding")]
     )
 
     def run(self) -> None:

@@ -217,7 +217,7 @@ def _begin(
 
 def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
     if practised is None:
-        raise InvalidInput(f"controller '{spec.name}' replays what 'ilc' has learned; run it")
+        raise InvalidInput(f"controller '{spec.name}' begins with what 'ilc' has learned; run it")
     return practised
 
 

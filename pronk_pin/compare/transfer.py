@@ -9,24 +9,27 @@ import numpy as np
 import pandas as pd
 
 from .._typing import Array
-from ..control import ControllerSpec, Skill
+from ..control import ControllerSpec, TorqueLibrary
 from ..errors import InvalidInput
-from ..gait import load_library
-from ..robot import load_robot
+from ..gait import Gait, load_library
+from ..robot import Robot, load_robot
 from .experiment import torque_library
 from .gains import judged, simulate
 from .scenario import Scenario
-from .simulate import Schedule
+from .simulate import Schedule, Simulation
 from .strides import to_dataset
 
 TOLERANCE = 0.25
 """By how much a reused skill's error may exceed that where it was learned."""
-_PRACTICE = Schedule(0.5, 4.0, 16.0)
+# At 0.8 m/s it takes 20 s until the touchdown stays at one tick.
+_PRACTICE = Schedule(0.5, 4.0, 28.0)
 _REPLAY = Schedule(0.5, 16.0, 0.0)  # the strides that count begin after the start
 
 
 def may_be_reused(replayed: Array, learned: Array, *, tolerance: float = TOLERANCE) -> bool:
-    """The rule: replay the skill for some strides, and keep it if it tracks nearly as at home.
+    """The rule for another world: try the skill, and keep it if it tracks nearly as at home.
+
+    Between practised speeds `TorqueLibrary.reusable` knows without a trial.
 
     Args:
         replayed: Errors of the joints in the new task [rad].
@@ -34,6 +37,15 @@ def may_be_reused(replayed: Array, learned: Array, *, tolerance: float = TOLERAN
         tolerance: By how much their root mean square may be larger.
     """
     return _rms(replayed) <= (1.0 + tolerance) * _rms(learned)
+
+
+def practise_library(
+    robot: Robot, gaits: Sequence[Gait], spec: ControllerSpec, scenario: Scenario
+) -> tuple[Simulation, TorqueLibrary]:
+    """Practise until the touchdowns have settled; the library is the mean of the last strides."""
+    practice = simulate(robot, gaits, spec, scenario, _PRACTICE)
+    strides = to_dataset(practice.strides, robot, gaits, attributes={"robot": robot.name})
+    return practice, torque_library(strides)
 
 
 def measure_transfers(
@@ -56,42 +68,41 @@ def measure_transfers(
     Returns:
         A row for each transfer, and for each speed that was left out: `task`; mean peaks over the
         speeds [rad] of the replayed skill, `thigh` and `calf`, and of one practised there,
-        `thigh_practised` and `calf_practised`; the
-        rule's answer `reuse`; and whether that was `right`: whether practice gains no more than the
-        tolerance.
+        `thigh_practised` and `calf_practised`; the rule's answer `reuse`, for a speed from what is
+        known of its neighbours, for a world from a trial; and whether that was `right`: whether
+        practice gains no more than the tolerance.
     """
     if spec.law is None or len(speeds) < 3:
         raise InvalidInput("transfers need a controller that learns, and three speeds or more")
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     frozen = replace(spec, law=None, flight_law=None)
-    practice = simulate(machine, gaits, spec, home, _PRACTICE)
-    strides = to_dataset(practice.strides, machine, gaits, attributes={"robot": robot})
-    stored = torque_library(strides)  # the mean of the last strides, as the controller replays
-    skill = Skill(stored.torque, stored.flight)
-    inner = np.array(speeds)[1:-1]
-    left_out = Skill(np.concatenate([stored.without(v).at(np.array([v])) for v in inner]))
+    practice, stored = practise_library(machine, gaits, spec, home)
+    skill, inner = stored.skill(np.array(speeds)), np.array(speeds)[1:-1]
+    left_out, known = stored.left_out(inner)
+    learned = _errors(practice)
+
+    def row(task: str, replayed: Array, practised: Array, reuse: bool) -> dict[str, object]:
+        gains_little = _rms(replayed) <= (1.0 + TOLERANCE) * _rms(practised)
+        peaks = {"thigh": replayed[0], "calf": replayed[1]}
+        peaks |= {"thigh_practised": practised[0], "calf_practised": practised[1]}
+        return {"task": task, **peaks, "reuse": reuse, "right": reuse == gains_little}
+
+    def tried(task: str, replay: Simulation, practised: Simulation) -> dict[str, object]:
+        errors = _errors(replay)
+        return row(task, errors, _errors(practised), may_be_reused(errors, learned))
+
     at_home = simulate(machine, gaits, frozen, home, _REPLAY, skill)
+    rows = [tried("at home", at_home, practice)]
     between = simulate(machine, gaits[1:-1], frozen, home, _REPLAY, left_out)
-    inside = simulate(machine, gaits[1:-1], spec, home, _PRACTICE)
-    tasks = [("at home", at_home, practice), ("speeds left out", between, inside)]
+    for k, speed in enumerate(inner):
+        # Robots do not know of each other: practice at home was practice at this speed, too.
+        errors, practised = _errors(between, k), _errors(practice, k + 1)
+        rows.append(row(f"left out {speed:+.2f} m/s", errors, practised, bool(known[k])))
     for world in worlds:
         replayed = simulate(machine, gaits, frozen, world, _REPLAY, skill)
-        tasks.append((world.name, replayed, simulate(machine, gaits, spec, world, _PRACTICE)))
-    judgements = [(name, judged(one), judged(other)) for name, one, other in tasks]
-    by_speed = [
-        (f"left out {speed:+.2f} m/s", judged(between, k), judged(inside, k))
-        for k, speed in enumerate(inner)
-    ]
-    judgements[2:2] = by_speed
-    rows, learned = [], _errors(judged(practice))
-    for name, replayed_there, practised_there in judgements:
-        with_skill, anew = _errors(replayed_there), _errors(practised_there)
-        reuse = may_be_reused(with_skill, learned)
-        gains_little = _rms(with_skill) <= (1.0 + TOLERANCE) * _rms(anew)
-        row = {"task": name, "thigh": with_skill[0], "calf": with_skill[1]}
-        row |= {"thigh_practised": anew[0], "calf_practised": anew[1]}
-        rows.append({**row, "reuse": reuse, "right": reuse == gains_little})
+        anew = simulate(machine, gaits, spec, world, _PRACTICE)
+        rows.append(tried(world.name, replayed, anew))
     return pd.DataFrame(rows)
 
 
@@ -107,11 +118,28 @@ def describe_transfers(table: pd.DataFrame) -> str:
             f"{row.task:<18}  {row.thigh:7.4f} {row.calf:7.4f}       {row.thigh_practised:7.4f} "
             f"{row.calf_practised:7.4f}   {advice}: {'right' if row.right else 'wrong'}"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, "", _in_words(table)])
 
 
-def _errors(judged_: dict[str, float | int]) -> Array:
-    return np.array([judged_["thigh"], judged_["calf"]], dtype=float)
+def _in_words(table: pd.DataFrame) -> str:
+    between = table[table["task"].str.startswith("left out")]
+    more = [between[joint].mean() / between[f"{joint}_practised"].mean() - 1.0 for joint in _JOINTS]
+    wrong = table[~table["right"]]
+    harmful, needless = int(wrong["reuse"].sum()), int((~wrong["reuse"]).sum())
+    return (
+        f"At speeds left out the stored skill's mean error is {more[0]:+.0%} in the thigh and "
+        f"{more[1]:+.0%} in the calf\nagainst practice there. Of {len(table)} answers of the rule "
+        f"{harmful} let a skill be reused that practice would better\nby more than "
+        f"{TOLERANCE:.0%}, and {needless} asked for practice that gained less."
+    )
+
+
+_JOINTS = ("thigh", "calf")
+
+
+def _errors(simulation: Simulation, robot: int | None = None) -> Array:
+    found = judged(simulation, robot)
+    return np.array([found[joint] for joint in _JOINTS], dtype=float)
 
 
 def _rms(values: Array) -> float:

@@ -126,6 +126,13 @@ CONTROLLERS = {
             flight_law=FLIGHT_LAW,
             timing=FlightTiming(),
         ),
+        ControllerSpec(
+            "library+ilc",
+            source="library",
+            law=PDTypeILC(),
+            flight_law=FLIGHT_LAW,
+            timing=FlightTiming(),
+        ),
         ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),

@@ -9,12 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._typing import Array
+from .._typing import Array, BoolArray
 from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
 from .record import resample
 
 SCHEMA = 2
 """Version of the file format."""
+LANDS_ALIKE = 5e-4
+"""Difference of two flights [s] below which they were practised for the same touchdown: contact is
+felt at whole milliseconds."""
+_ROUNDING = 1e-6
 _AGAIN = "practise again, and save it with TorqueLibrary.save"
 
 
@@ -76,18 +80,33 @@ class TorqueLibrary:
         return np.asarray(resample(self.torque[None], self._places(speeds)[None])[0])
 
     def skill(self, speeds: Array) -> Skill:
-        """Torques at given speeds (m,) and, if all were practised, how long their flights last.
+        """Torques at given speeds (m,), and how long their flights last.
 
-        Between practised speeds a flight lasts no mean of its neighbours': contact comes at whole
-        ticks, and one tick later is elsewhere. There `FlightTiming` finds out.
+        A flight lasts as long as that of the nearest practised speed, the lower of two: a torque
+        was learned for its touchdown, which comes at a whole tick, so that a mean of two would be
+        between those that occur.
+
+        Raises:
+            SpeedOutOfRange: The library does not cover a speed.
+        """
+        nearest = np.ceil(self._places(speeds) - 0.5 - _ROUNDING).astype(np.intp)
+        return Skill(self.at(speeds), self.flight[nearest])
+
+    def reusable(self, speeds: Array) -> BoolArray:
+        """Whether the skill at given speeds may be replayed without practice, shape (m,).
+
+        That is so where the practised speeds around it landed alike (`LANDS_ALIKE`). A tick is
+        0.02 rad of swing: torques of two that did not were learned for stances that begin
+        elsewhere, and their mean fits neither. It says nothing of worlds other than that of the
+        practice.
 
         Raises:
             SpeedOutOfRange: The library does not cover a speed.
         """
         places = self._places(speeds)
-        nearest = np.rint(places).astype(np.intp)
-        practised = np.allclose(places, nearest, atol=1e-6)
-        return Skill(self.at(speeds), self.flight[nearest] if practised else None)
+        lower = self.flight[np.floor(places + _ROUNDING).astype(np.intp)]
+        upper = self.flight[np.ceil(places - _ROUNDING).astype(np.intp)]
+        return np.asarray(np.abs(upper - lower) < LANDS_ALIKE)
 
     def _places(self, speeds: Array) -> Array:
         """Fractional indices of speeds into those of the library, shape (m,)."""
@@ -103,6 +122,21 @@ class TorqueLibrary:
         return TorqueLibrary(
             self.speeds[rest], self.torque[rest], self.spread[rest], self.flight[rest]
         )
+
+    def left_out(self, speeds: Array) -> tuple[Skill, BoolArray]:
+        """Skills at practised speeds (m,) as if each had not been practised, from its neighbours.
+
+        Returns:
+            The skills, and which of them are `reusable`, shape (m,).
+
+        Raises:
+            SpeedOutOfRange: A speed is the first or the last, or the library does not cover it.
+        """
+        rest = [(self.without(speed), np.array([speed])) for speed in speeds]
+        skills = [library.skill(speed) for library, speed in rest]
+        torque, flight = (np.concatenate(parts) for parts in zip(*skills, strict=True))
+        reusable = [library.reusable(speed) for library, speed in rest]
+        return Skill(torque, flight), np.concatenate(reusable)
 
     def save(self, path: Path | str) -> None:
         """Write the library to an npz file, whole or not at all.

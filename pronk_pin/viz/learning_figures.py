@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 
 from ..compare.prediction import Prediction
 from ..errors import cannot_write
+from .style import LOOKS
 
 
 def predicted_and_measured(predictions: Sequence[Prediction]) -> Figure:
@@ -35,15 +37,47 @@ def predicted_and_measured(predictions: Sequence[Prediction]) -> Figure:
     return figure
 
 
+def errors_by_seed(table: pd.DataFrame) -> Figure:
+    """Peak error over the strides of learning by what it began with: median and range of speeds.
+
+    Args:
+        table: What `compare.seeding.measure_seeding` returns.
+    """
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    for one, joint in zip(axes, ("calf", "thigh"), strict=True):
+        for name, rows in table.groupby("controller", sort=False):
+            errors, look = rows.groupby("stride")[joint], LOOKS[str(name)]
+            strides = errors.median().index.to_numpy()
+            one.semilogy(
+                strides, errors.median(), linestyle=look.line, color=look.color, label=look.label
+            )
+            one.fill_between(strides, errors.min(), errors.max(), color=look.color, alpha=0.15)
+        one.set_title(joint, fontsize=9)
+        one.set_xlabel("strides of learning")
+    axes[0].set_ylabel("peak of the stance error [rad]")
+    axes[1].legend(fontsize=7)
+    return figure
+
+
 def write_prediction(predictions: Sequence[Prediction], path: Path) -> Path:
-    """Write `predicted_and_measured` to a file.
+    """Write `predicted_and_measured` to a file; errors are those of `write_seeding`."""
+    return _write(predicted_and_measured(predictions), path)
+
+
+def write_seeding(table: pd.DataFrame, path: Path) -> Path:
+    """Write `errors_by_seed` to a file.
 
     Raises:
         FileProblem: It cannot be written.
     """
+    return _write(errors_by_seed(table), path)
+
+
+def _write(figure: Figure, path: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        predicted_and_measured(predictions).savefig(path, dpi=120)
+        figure.savefig(path, dpi=120)
     except (OSError, ValueError) as error:
-        raise cannot_write(path, error, "choose another file, as analysis.png") from error
+        raise cannot_write(path, error, f"choose another file, as {path.stem}.png") from error
     return path

@@ -31,8 +31,9 @@ PALETTE = {
     "grey": "#737373",
     "brown": "#5C3A21",
     "indigo": "#4B0082",
+    "ultramarine": "#2222EE",
 }
-"""The colours by name; yellow is too light for lines on white. The last three are not of theirs."""
+"""The colours by name; yellow is too light for lines on white. The last four are not of theirs."""
 
 REFERENCE, ACCENT = PALETTE["grey"], PALETTE["vermilion"]
 """Colours of references, and of events and limits."""
@@ -77,6 +78,7 @@ LOOKS = {
     "library": Look("PD + library", PALETTE["sky"], _SHORT, "^"),
     "ilc": Look("ILC", PALETTE["blue"], "-", "o"),
     "model+ilc": Look("ILC seeded by the model", PALETTE["green"], _DASHED, "D"),
+    "library+ilc": Look("ILC seeded by the library", PALETTE["ultramarine"], _SHORT, "<"),
     "ilc-paper": Look("ILC, the paper's law", PALETTE["vermilion"], _DASH_DOT, "v"),
     "identified": Look("PD + identified model", PALETTE["brown"], _DASHED, "P"),
     "identified+gait": Look("PD + identified model, gaits again", PALETTE["indigo"], "-", "*"),

@@ -89,7 +89,7 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
         (
             {"controllers": ("pd", "lqr")},
             "unknown controller 'lqr'; choose one of: "
-            "pd, ilc, model, library, model+ilc, ilc-stance",
+            "pd, ilc, model, library, model+ilc, library+ilc, ilc-stance",
         ),
         (
             {"scenarios": ("moon",)},
@@ -142,7 +142,7 @@ def test_the_model_seeds_the_learning_that_goes_on_from_it() -> None:
 
 def test_the_library_cannot_be_replayed_before_it_is_learned() -> None:
     cell = Experiment(speeds=(0.2,), controllers=("library",), schedule=SHORT).cells()[-1]
-    with pytest.raises(InvalidInput, match="'library' replays what 'ilc' has learned; run it"):
+    with pytest.raises(InvalidInput, match="'library' begins with what 'ilc' has learned; run it"):
         run_cell(cell)
 
 

@@ -27,11 +27,19 @@ def test_speeds_between_get_a_mixture_of_their_neighbours(learned: TorqueLibrary
     np.testing.assert_allclose(learned.at(np.array([0.1]))[0], expected)
 
 
-def test_only_practised_speeds_know_how_long_their_flights_last(learned: TorqueLibrary) -> None:
-    practised, between = (learned.skill(np.array(v)) for v in ([0.3, -0.1], [0.3, 0.1]))
-    np.testing.assert_array_equal(practised.flight, [0.23, 0.19])
-    assert between.flight is None
-    np.testing.assert_array_equal(between.feedforward, learned.at(np.array([0.3, 0.1])))
+def test_flights_last_as_long_as_at_the_nearest_practised_speed(learned: TorqueLibrary) -> None:
+    wanted = np.array([0.3, -0.1, 0.1, 0.2, 0.15])
+    skill = learned.skill(wanted)
+    np.testing.assert_array_equal(skill.flight, [0.23, 0.19, 0.2, 0.23, 0.2])
+    np.testing.assert_array_equal(skill.feedforward, learned.at(wanted))
+
+
+def test_a_skill_is_reusable_where_it_was_practised_and_where_its_neighbours_land_alike() -> None:
+    torque = np.zeros((4, 2, SAMPLES, 12))
+    flight = np.array([0.1985, 0.1986, 0.1995, 0.1995])
+    library = TorqueLibrary(np.array([0.0, 0.1, 0.2, 0.3]), torque, torque, flight)
+    wanted = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
+    assert library.reusable(wanted).tolist() == [True, True, True, False, True, True, True]
 
 
 def test_a_speed_that_was_not_practised_is_refused(learned: TorqueLibrary) -> None:
@@ -101,3 +109,15 @@ def test_a_speed_left_out_is_interpolated_between_the_others(learned: TorqueLibr
     np.testing.assert_array_equal(rest.speeds, [-0.1, 0.3])
     expected = 0.75 * learned.torque[0] + 0.25 * learned.torque[2]
     np.testing.assert_allclose(rest.at(np.array([0.0]))[0], expected)
+    skill, reusable = learned.left_out(np.array([0.0]))
+    np.testing.assert_allclose(skill.feedforward, expected[None])
+    np.testing.assert_array_equal(skill.flight, [0.19])
+    assert reusable.tolist() == [False]  # one lands 40 ms after the other
+
+
+def test_the_first_and_the_last_speed_have_no_neighbours_to_learn_from(
+    learned: TorqueLibrary,
+) -> None:
+    for speed in (-0.1, 0.3):
+        with pytest.raises(SpeedOutOfRange):
+            learned.left_out(np.array([0.0, speed]))
