@@ -377,7 +377,7 @@ def test_the_mended_gaits_beat_practice_where_nothing_was_practised(
     for joint in ("thigh", "calf"):
         mended = table.loc["identified+gait", joint]
         assert mended < 0.012
-        assert mended < 0.5 * table.loc["ilc", joint]
+        assert mended < 0.65 * table.loc["ilc", joint]  # after 11 strides of learning
         assert mended < 0.2 * table.loc["model", joint]
     assert "identified+gait" in format_loop(table.reset_index())
 
