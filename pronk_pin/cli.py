@@ -27,7 +27,12 @@ from .compare import (
 from .compare.changes import format_changes
 from .compare.closing import close_loop, format_loop
 from .compare.gains import describe_gains, sweep_gains
-from .compare.prediction import compare_prediction, describe_prediction, practise
+from .compare.prediction import (
+    compare_prediction,
+    describe_prediction,
+    practise,
+    stored_practice,
+)
 from .compare.reproduce import format_reproduction
 from .compare.scenario import load_scenario
 from .compare.seeding import describe_seeding, measure_seeding
@@ -54,6 +59,8 @@ from .viz.gait_figures import write_gait_figures
 from .viz.learning_figures import write_prediction, write_seeding
 from .viz.practice import practice_programme
 from .viz.report import write_figures, write_report
+from .viz.skill_figures import gains_figure, transfers_figure
+from .viz.style import save_figure
 
 
 @dataclass(frozen=True)
@@ -405,7 +412,8 @@ class Analyze:
     scenario: str = "nominal"
     """World of the practice."""
     result: Path | None = None
-    """Results folder with a practice; by default a short one is simulated."""
+    """Results folder with a practice of a law of the stance only, as ilc-stance; by default a short
+    one is simulated."""
     strides: int = 20
     """Strides of learning to compare."""
     robot: str = "a1"
@@ -421,8 +429,7 @@ class Analyze:
         if self.result is None:
             made = practise(spec, self.speed, scenario, robot=self.robot, strides=self.strides)
         else:
-            results = Results.load(self.result)
-            made = results.strides(results.find(controller=self.controller, scenario=self.scenario))
+            made = stored_practice(Results.load(self.result), spec, self.speed, scenario)
         predictions = []
         for speed in self.speed:
             predictions.append(compare_prediction(spec, made, speed, scenario, number=self.strides))
@@ -445,11 +452,15 @@ class Gains:
     """World of the practice."""
     robot: str = "a1"
     """Robot."""
+    figure: Path = Path("gains.png")
+    """Figure to write: png, svg or pdf."""
 
     def run(self) -> None:
         """Do it."""
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
-        print(describe_gains(sweep_gains(spec, self.speed, scenario, robot=self.robot)))
+        table = sweep_gains(spec, self.speed, scenario, robot=self.robot)
+        print(describe_gains(table))
+        print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -470,6 +481,8 @@ class Transfer:
     """Worlds in which the skill is tried."""
     robot: str = "a1"
     """Robot."""
+    figure: Path = Path("transfer.png")
+    """Figure to write: png, svg or pdf."""
 
     def run(self) -> None:
         """Do it."""
@@ -481,6 +494,7 @@ class Transfer:
             robot=self.robot,
         )
         print(describe_transfers(table))
+        print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)

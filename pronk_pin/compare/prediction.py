@@ -19,6 +19,7 @@ from ..control import (
     Settings,
     StrideRecord,
     lifted_model,
+    load_controller,
     phase_grid,
 )
 from ..control.analysis import Analysis, analyze, predict
@@ -27,6 +28,7 @@ from ..control.rehearsal import rehearse
 from ..errors import InvalidInput
 from ..gait import load_library
 from ..robot import JOINTS, load_robot
+from .results import Results
 from .scenario import Scenario
 from .simulate import Schedule, Simulation
 from .strides import to_dataset
@@ -88,6 +90,48 @@ def practise(
         rng=np.random.default_rng(0),
     )
     return to_dataset(simulation.run(), load_robot(robot), gaits, attributes={"robot": robot})
+
+
+def stored_practice(
+    results: Results, spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario
+) -> xr.Dataset:
+    """The strides of a practice in a results folder that a prediction can be laid beside.
+
+    The prediction covers a law of the stance, with flights as planned, on a trunk that is locked.
+
+    Args:
+        results: The results.
+        spec: The controller that practised.
+        speeds: Speeds that are asked for [m/s].
+        scenario: In which world.
+
+    Raises:
+        InvalidInput: More was learned than the prediction covers, or elsewhere.
+    """
+    _law(spec)
+    experiment = results.experiment
+    if not _covered(spec):
+        known = [name for name in experiment.controllers if _covered(load_controller(name))]
+        remedy = (
+            f"choose {' or '.join(known)}, which this result has"
+            if known
+            else "make a result with 'pronk-pin compare --controllers ilc-stance', or leave "
+            "--result out, and a practice in stance only is simulated"
+        )
+        raise InvalidInput(
+            f"controller '{spec.name}' has learned in flight, too, or how long a flight lasts, and "
+            f"the prediction covers the stance only; {remedy}"
+        )
+    if experiment.base != "locked":
+        raise InvalidInput(
+            f"this result has base '{experiment.base}', and the prediction a locked one; make one "
+            "with --base locked"
+        )
+    for speed in speeds:
+        if not np.isclose(experiment.speeds, speed, atol=1e-6).any():
+            there = ", ".join(f"{one:g}" for one in experiment.speeds)
+            raise InvalidInput(f"this result has no speed {speed:g} m/s; choose from {there}")
+    return results.strides(results.find(controller=spec.name, scenario=scenario.name))
 
 
 def compare_prediction(
@@ -190,6 +234,11 @@ def _law(spec: ControllerSpec) -> LearningLaw:
             f"controller '{spec.name}' does not learn in stance; choose one with a law, as 'ilc'"
         )
     return spec.law
+
+
+def _covered(spec: ControllerSpec) -> bool:
+    """Whether the law of the stance is all that a controller learns by."""
+    return spec.law is not None and spec.flight_law is None and spec.timing is None
 
 
 def _in_words(gain: float, memory: float, multiplier: float, less: float) -> str:
