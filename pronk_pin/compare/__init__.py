@@ -8,8 +8,9 @@ from .mismatch import KNOWN, MISMATCHES, Mismatch
 from .results import Results, default_folder
 from .run import run_experiment
 from .scenario import SCENARIOS, Scenario, load_scenario, random_scenarios
+from .schedule import Schedule
 from .sensors import Sensors, SensorSuite
-from .simulate import Schedule, Simulation
+from .simulate import Simulation
 from .world import World, build_model
 
 __all__ = [

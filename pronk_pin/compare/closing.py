@@ -24,7 +24,8 @@ from .experiment import torque_library
 from .explanation import Explanation, mended_gaits
 from .metrics import by_joint
 from .scenario import Scenario, load_scenario
-from .simulate import Schedule, Simulation
+from .schedule import Schedule
+from .simulate import Simulation
 from .strides import to_dataset
 
 CONTROLLERS = ("model", "library", "ilc", "identified", "identified+gait")

@@ -24,7 +24,8 @@ from .explanation import explain, mended_gaits
 from .foreign import mjcf_sha256
 from .metrics import steady
 from .scenario import load_scenario
-from .simulate import Progress, Schedule, Simulation
+from .schedule import Schedule
+from .simulate import Progress, Simulation
 from .strides import to_dataset
 
 LEARNED = ("library", "identified")

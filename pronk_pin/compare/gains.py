@@ -14,7 +14,8 @@ from ..gait import Gait, load_library
 from ..robot import JOINTS, Robot, load_robot
 from .metrics import STEADY_STRIDES
 from .scenario import Scenario
-from .simulate import Schedule, Simulation
+from .schedule import Schedule
+from .simulate import Simulation
 
 SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Feedback gains of the sweep, over the controller's own."""

@@ -30,7 +30,8 @@ from ..gait import load_library
 from ..robot import JOINTS, load_robot
 from .results import Results
 from .scenario import Scenario
-from .simulate import Schedule, Simulation
+from .schedule import Schedule
+from .simulate import Simulation
 from .strides import to_dataset
 
 _PRACTICE = 6.0

@@ -40,7 +40,7 @@ from .foreign import ForeignRobot, mjcf_sha256
 from .metrics import COLUMNS, KEYS, summarize
 from .practice import practice, rows_of_beating
 from .provenance import versions
-from .simulate import Schedule
+from .schedule import Schedule
 
 SCHEMA = 3
 """Version of the layout of a results folder."""

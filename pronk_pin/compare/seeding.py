@@ -15,7 +15,8 @@ from ..robot import JOINTS, Robot, load_robot
 from .gains import NOTHING, simulate
 from .metrics import STEADY_STRIDES, settling_stride
 from .scenario import Scenario
-from .simulate import Schedule, Simulation
+from .schedule import Schedule
+from .simulate import Simulation
 from .transfer import practise_library
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")

@@ -16,7 +16,8 @@ from ..robot import Robot, load_robot
 from .experiment import torque_library
 from .gains import judged, simulate
 from .scenario import Scenario
-from .simulate import Schedule, Simulation
+from .schedule import Schedule
+from .simulate import Simulation
 from .strides import to_dataset
 
 TOLERANCE = 0.25

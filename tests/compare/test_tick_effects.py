@@ -96,7 +96,7 @@ def test_a_delay_is_the_same_torque_later(build: Build) -> None:
     late = build(replace(load_scenario("nominal"), delay=0.003))
     told: list[np.ndarray] = []  # type: ignore[type-arg]
     given: list[np.ndarray] = []  # type: ignore[type-arg]
-    command, play, advance = late._motors.command, late.world.play, late.world.advance
+    command, play, advance = late.player.motors.command, late.world.play, late.world.advance
 
     def spy_command(rows, commands, ticks):  # type: ignore[no-untyped-def]
         for k in np.flatnonzero(rows == 0):
@@ -114,7 +114,7 @@ def test_a_delay_is_the_same_torque_later(build: Build) -> None:
             given.extend(played[k][: ticks[k]])
         advance(rows, motion, ticks)
 
-    late._motors.command = spy_command  # type: ignore[method-assign]
+    late.player.motors.command = spy_command  # type: ignore[method-assign]
     late.world.play, late.world.advance = spy_play, spy_advance  # type: ignore[method-assign]
     late.run()
     assert len(told) == len(given) > 1000
@@ -143,9 +143,9 @@ def test_what_is_kept_of_a_robot_with_biased_encoders_is_the_truth(build: Build)
     biased = replace(nominal, sensors=replace(nominal.sensors, encoder_bias=0.02))
     simulation = build(biased)
     simulation.run()
-    bias = simulation._sensors._encoder_bias
-    believed, true = simulation._seen.joints, simulation._log.joints
-    ticks = slice(simulation._late, 50)
+    bias = simulation.player.sensors._encoder_bias
+    believed, true = simulation.player.seen.joints, simulation.player.log.joints
+    ticks = slice(simulation.controller.spec.touchdown_ticks, 50)
     np.testing.assert_allclose(
         (believed - true)[:, ticks], np.broadcast_to(bias[:, None], true[:, ticks].shape)
     )
@@ -154,10 +154,13 @@ def test_what_is_kept_of_a_robot_with_biased_encoders_is_the_truth(build: Build)
 def test_the_same_seed_makes_the_same_noise_for_every_controller(build: Build) -> None:
     noisy = load_scenario("noise")
     first, second = (build(noisy, controller=name) for name in ("pd", "model"))
-    np.testing.assert_array_equal(first._sensors._encoder_bias, second._sensors._encoder_bias)
+    np.testing.assert_array_equal(
+        first.player.sensors._encoder_bias, second.player.sensors._encoder_bias
+    )
     rows, zero = np.arange(2), np.zeros((2, 12))
     np.testing.assert_array_equal(
-        first._sensors.encoders(rows, zero, zero), second._sensors.encoders(rows, zero, zero)
+        first.player.sensors.encoders(rows, zero, zero),
+        second.player.sensors.encoders(rows, zero, zero),
     )
 
 
@@ -167,7 +170,7 @@ def test_the_accelerometer_integrates_to_the_change_of_speed(build: Build, robot
     liftoff, found = simulation.controller.liftoff, []
 
     def spy(rows, log):  # type: ignore[no-untyped-def]
-        rate = simulation._log.base_rate[rows]
+        rate = simulation.player.log.base_rate[rows]
         for row, length in enumerate(log.length):
             force = log.specific_force[row, : length - 1] - [0.0, 0.0, robot.gravity]
             gained = force.sum(axis=0)[[0, 2]] * 0.001

@@ -90,7 +90,7 @@ def test_a_push_is_forgotten(build: Build, undisturbed: Simulation) -> None:
 
 def blind(simulation: Simulation, first: int, last: int, *, robot: int = 0) -> None:
     """Let the first robot's feet feel nothing between two ticks of its clock."""
-    feet = simulation._sensors.feet
+    feet = simulation.player.sensors.feet
 
     def fail(rows: IntArray, force: Array) -> Array:
         felt = feet(rows, force).copy()
@@ -98,7 +98,7 @@ def blind(simulation: Simulation, first: int, last: int, *, robot: int = 0) -> N
         felt[(rows == robot) & (clock >= first) & (clock < last)] = 0.0
         return felt
 
-    simulation._sensors.feet = fail  # type: ignore[method-assign]
+    simulation.player.sensors.feet = fail  # type: ignore[method-assign]
 
 
 def test_a_missed_touchdown_is_no_fall_and_teaches_nothing(build: Build) -> None:
@@ -119,7 +119,7 @@ def test_a_missed_touchdown_is_no_fall_and_teaches_nothing(build: Build) -> None
 def test_a_touchdown_that_is_none_teaches_nothing(build: Build) -> None:
     """The feet feel one blow in the middle of a flight, and the ground after it."""
     simulation = build(LATE)
-    feet, ends = simulation._sensors.feet, simulation._ends
+    feet, ends = simulation.player.sensors.feet, simulation.player._ends
     middle = 0.55 * simulation._gaits[0].flight.duration / 0.001
     state = {"flown": False, "struck": False}
 
@@ -135,7 +135,7 @@ def test_a_touchdown_that_is_none_teaches_nothing(build: Build) -> None:
         state["flown"] = bool(airborne and late and tick > middle)
         return ends(rows, motion, tick, length, airborne)
 
-    simulation._sensors.feet, simulation._ends = strike, note  # type: ignore[method-assign]
+    simulation.player.sensors.feet, simulation.player._ends = strike, note  # type: ignore[method-assign]
     learned = watch_learning(simulation)
     simulation.run()
     assert state["struck"]
@@ -152,7 +152,7 @@ def test_a_sensor_that_fails_for_a_while_stops_learning_for_so_long(
     build: Build, value: float
 ) -> None:
     simulation = build(LATE)
-    encoders = simulation._sensors.encoders
+    encoders = simulation.player.sensors.encoders
 
     def fail(rows: IntArray, joints: Array, rates: Array) -> tuple[Array, Array]:
         angle, rate = (part.copy() for part in encoders(rows, joints, rates))
@@ -161,7 +161,7 @@ def test_a_sensor_that_fails_for_a_while_stops_learning_for_so_long(
         angle[failing, 4] = value
         return angle, rate
 
-    simulation._sensors.encoders = fail  # type: ignore[method-assign]
+    simulation.player.sensors.encoders = fail  # type: ignore[method-assign]
     learned = watch_learning(simulation)
     simulation.run()
     assert simulation.upright.all()
@@ -183,7 +183,7 @@ def test_a_motor_at_its_limit_does_not_wind_up(build: Build, robot: Robot) -> No
     simulation = build(replace(NOMINAL, payload=2.0), robot=weak)
     learned = watch_learning(simulation)
     simulation.run()
-    missing = np.abs(simulation._log.missing).max()
+    missing = np.abs(simulation.player.log.missing).max()
     assert missing > 0.0  # it is at its limit even in the end
     sizes = [np.abs(feedforward).max() for feedforward in learned]
     assert max(sizes) <= limit

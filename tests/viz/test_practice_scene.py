@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pronk_pin.compare import Experiment, Results, run_experiment
-from pronk_pin.compare.simulate import Schedule
+from pronk_pin.compare.schedule import Schedule
 from pronk_pin.errors import InvalidInput
 from pronk_pin.viz.practice import practice_programme
 from pronk_pin.viz.report import scenario_figures

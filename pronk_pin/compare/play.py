@@ -1,0 +1,265 @@
+"""n robots that play tapes in their world, until they end or a touchdown is felt.
+
+Where the law is affine servos play whole tapes; where the motors are late, as many ticks at once as
+they are; else the feedback is computed tick by tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .._typing import Array, IntArray
+from ..control import Balance, ControllerSpec, PhaseLog, Tape, clip_torque, phase_grid
+from ..conventions import rotation_matrix
+from ..gait import Gait
+from ..robot import Robot
+from .motors import Motors
+from .record import TickLog
+from .scenario import Scenario
+from .sensors import SensorSuite
+from .world import Motion, World, finite
+
+_EARLIEST_TOUCHDOWN = 0.5
+"""Phase of flight before which contact is the lift-off's, not a touchdown."""
+
+_EXPECTED_TOUCHDOWN = 0.9
+"""Phase of flight up to which it is played in one go."""
+
+_CHUNK = 8
+"""Ticks that are played in one go from then on; what comes after a touchdown is thrown away."""
+
+_FALLEN = 0.6
+"""Trunk height, over that of the gait's lowest point, below which a robot has fallen."""
+
+
+_TUMBLED = np.cos(np.radians(45.0))
+"""Cosine of the angle between the trunk's axis and the vertical beyond which it has fallen."""
+
+
+class Player:
+    """Plays tapes and logs what happened.
+
+    Several threads may play at once, each its own robots, where the trunks are locked.
+
+    Args:
+        robot: The robot.
+        gaits: The gait of each of the n robots.
+        spec: The controller, whose gains and balance act at every tick.
+        scenario: The world.
+        ticks: Length of the longest tape.
+        rng: Source of the sensors' noise.
+        base: How the trunks may move, see `build_model`.
+        chunked: Play many ticks at once where that is possible; the motion is the same.
+
+    Attributes:
+        world: The robots in MuJoCo.
+        motors, sensors: Theirs.
+        balance: What keeps a trunk up that may turn; None where it is locked.
+        log: The phase that they are in, as it truly is.
+        seen: The same as the robots know it: the log itself, where nothing is noisy.
+        upright: Which robots have not fallen, shape (n,).
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gaits: Sequence[Gait],
+        spec: ControllerSpec,
+        scenario: Scenario,
+        *,
+        ticks: int,
+        rng: np.random.Generator,
+        base: str,
+        chunked: bool,
+    ) -> None:
+        n, dt = len(gaits), scenario.timestep
+        turns = base != "locked"
+        chunked = chunked and not turns
+        self._gains, self._tau_max, self._imu = spec.gains, robot.tau_max, spec.imu
+        self._servos = chunked and scenario.affine
+        # Ticks whose torques are known beforehand.
+        self._ahead = scenario.delay_ticks if chunked and scenario.foreseeable else 0
+        servo = spec.gains if self._servos else None
+        self.world = World(robot, scenario, n, base=base, servo=servo)
+        self.motors = Motors(scenario, robot.tau_max, n)
+        self.sensors = SensorSuite(scenario.sensors, n, rng)
+        self.log = self.seen = TickLog(n, ticks, turns=turns)
+        if not self._servos and not self._ahead:
+            self.seen = TickLog(n, ticks, turns=turns)
+        self.balance = None
+        if turns:
+            self.balance = Balance(
+                robot, gaits, spec.balance, gains=spec.gains, ticks=ticks, timestep=dt
+            )
+        self._late = spec.touchdown_ticks
+        self._load = spec.contact.touchdown * robot.mass * robot.gravity
+        flight = np.array([gait.flight.duration for gait in gaits])
+        self._earliest = np.round(_EARLIEST_TOUCHDOWN * flight / dt).astype(np.intp)
+        self._expected = np.round(_EXPECTED_TOUCHDOWN * flight / dt).astype(np.intp)
+        heights = [gait.stance.base_reference(phase_grid())[0][:, 1] for gait in gaits]
+        self._floor = _FALLEN * np.min(heights, axis=1)
+        self.upright = np.ones(n, dtype=bool)
+
+    def play(self, rows: IntArray, tape: Tape, *, part: int | None) -> IntArray:
+        """Play tapes into the log until they end, or a flight's touchdown is felt.
+
+        Args:
+            rows: Whose.
+            tape: The tapes.
+            part: Part of the stride that they are, an index into `PARTS`; None for the start-up.
+
+        Returns:
+            How many ticks were played, shape (m,).
+        """
+        world, log, seen = self.world, self.log, self.seen
+        airborne = part == 1
+        told = tape.setpoint(self._gains) if self._servos else None
+        played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
+        while going.size:
+            who, end = rows[going], int(tape.length[going].max())
+            stop = min(self._next_stop(who, tick, airborne), end)
+            if stop > tape.ticks:
+                tape = tape.held(end)
+                told = told if told is None else tape.setpoint(self._gains)
+            if told is not None:
+                motion = felt = world.play(who, told[going, tick:stop])
+            elif self._ahead:
+                motion = felt = world.play(who, self.motors.coming(who, stop - tick))
+            else:
+                encoders = self.sensors.encoders(who, world.joints[who], world.joint_rates[who])
+                torque = self._torque(who, encoders, tape, going, tick, part)
+                torque = self.motors.drive(who, torque, world.joint_rates[who])
+                motion = world.play(who, torque[:, None])
+                felt = self._felt(who, motion, encoders)
+                seen.write(who, tick, felt)
+            log.write(who, tick, motion)
+            played[going] = self._ends(who, felt, tick, tape.length[going], airborne)
+            count = np.minimum(played[going], stop) - tick
+            world.advance(who, motion, count)
+            if self._ahead:
+                self.motors.command(who, self._asked(motion, tape, going, tick), count)
+            self._restart_broken(who)
+            going, tick = going[played[going] > stop], stop
+        if airborne:
+            played = np.maximum(played, 1 + self._late)  # even if it broke before
+        seen.torques(rows, tape, self._gains, self._tau_max, int(played.max()))
+        if seen is not log:
+            log.take_torques(rows, seen)
+        return played
+
+    def _next_stop(self, rows: IntArray, tick: int, airborne: bool) -> int:
+        """Up to which tick to play in one go, if the tapes do not end before."""
+        if not self._servos:
+            return tick + max(self._ahead, 1)
+        if not airborne:
+            return self.log.size
+        expected = int(self._expected[rows].min())
+        return expected if tick < expected else tick + _CHUNK
+
+    def _asked(self, motion: Motion, tape: Tape, going: IntArray, tick: int) -> Array:
+        """Torques of the feedback law along a motion from a tick on, shape (m, ticks, 12)."""
+        ticks = slice(tick, tick + motion.joints.shape[1])
+        feedback = self._gains.feedback(
+            tape.position[going, ticks] - motion.joints,
+            tape.velocity[going, ticks] - motion.joint_rates,
+        )
+        return clip_torque(feedback, tape.feedforward[going, ticks], self._tau_max)
+
+    def _torque(
+        self,
+        rows: IntArray,
+        encoders: tuple[Array, Array],
+        tape: Tape,
+        going: IntArray,
+        tick: int,
+        part: int | None,
+    ) -> Array:
+        """Torques of the feedback law at one tick, and of the balance, shape (m, 12)."""
+        joints, rates = encoders
+        feedback = self._gains.feedback(
+            tape.position[going, tick] - joints, tape.velocity[going, tick] - rates
+        )
+        if self.balance is not None:
+            balance = np.zeros_like(feedback)
+            if part is not None:
+                balance = self.balance.torque(
+                    part, rows, tick, self._believed(rows), joints, tape.position[going, tick]
+                )
+            self.seen.balance[rows, tick] = balance
+            feedback = feedback + balance
+        return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
+
+    def _believed(self, rows: IntArray) -> tuple[Array, Array]:
+        """Pose (m, 7) and velocity (m, 6) of the trunk as the robots know them: the true ones."""
+        return self.world.pose[rows], self.world.twist[rows]
+
+    def _felt(self, rows: IntArray, motion: Motion, encoders: tuple[Array, Array]) -> Motion:
+        """One tick's motion as the robots know it."""
+        joints, rates = encoders
+        return motion._replace(
+            joints=joints[:, None],
+            joint_rates=rates[:, None],
+            force=self.sensors.feet(rows, motion.force),
+        )
+
+    def _ends(
+        self, rows: IntArray, motion: Motion, tick: int, length: IntArray, airborne: bool
+    ) -> IntArray:
+        """Ticks after which the phases end, beyond the motion where they do not end in it.
+
+        Robots that fall in it are noted as such. One that misses its touchdown has not fallen: its
+        flight ends late, with the legs held out, and the next stance begins.
+        """
+        count = tick + 1 + np.arange(motion.base.shape[1])  # ticks played after each step
+        over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
+        if airborne:
+            load = motion.force[..., 2].sum(axis=-1) > self._load
+            over |= load & (count > self._earliest[rows, None])
+        if not finite(motion.path[:, -1]).all():  # what is not finite stays so
+            over |= ~finite(motion.path[:, 1:])
+        ended = over.any(axis=1)
+        ends[ended] = count[np.argmax(over[ended], axis=1)]
+        too_low = motion.base[..., 1] < self._floor[rows, None]
+        if motion.pose is not None:
+            too_low |= rotation_matrix(motion.pose[..., 3:])[..., 2, 2] < _TUMBLED
+        self.upright[rows] &= ~(too_low & (count <= ends[:, None])).any(axis=1)
+        return ends
+
+    def _restart_broken(self, rows: IntArray) -> None:
+        """Put robots that left the finite numbers back to rest; they have fallen."""
+        broken = rows[~finite(self.world.state[rows])]
+        if broken.size:
+            self.world.restart(broken)
+            self.upright[broken] = False
+
+    def measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+        """What the robots measured in a part of the stride of so many ticks (m,)."""
+        phase = self.seen.phase(rows, length, felt=felt)
+        if not self._imu:
+            return phase
+        # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
+        rate = self.log.base_rate[rows, : int(length.max()) + 1]
+        if rate.shape[1] == int(length.max()):
+            rate = np.concatenate([rate, rate[:, -1:]], axis=1)
+        force = np.zeros((*rate[:, 1:].shape[:2], 3))
+        force[..., [0, 2]] = np.diff(rate, axis=1) / self.world.scenario.timestep
+        last = np.arange(len(rows)), length - 1
+        force[last] = force[last[0], np.maximum(length - 2, 0)]  # the log ends there
+        force -= self.world.scenario.gravity_vector
+        _, force = self.sensors.imu(rows, np.zeros_like(force), force)
+        return replace(phase, specific_force=force)
+
+    def rewind(self, rows: IntArray, start: IntArray) -> None:
+        """The ticks from `start` (m,) on, in which a touchdown was not felt, are the stance's."""
+        for log in {id(log): log for log in (self.log, self.seen)}.values():
+            log.rewind(rows, start, self._late)
+
+    def tilt(self, part: int, rows: IntArray, length: IntArray) -> Array:
+        """Largest angle between trunk and gait in a part of the stride [rad], shape (m,)."""
+        if self.balance is None:
+            return np.zeros(len(rows))
+        pose = self.log.pose[rows, : int(length.max())]
+        return self.balance.tilt(part, rows, pose, length)

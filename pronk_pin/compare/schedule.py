@@ -1,0 +1,46 @@
+"""What happens when in a simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InvalidInput
+
+_SHORTEST = 1.0
+"""Shortest practice and learning [s]: even a robot that lies on the ground finishes a stride."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """What happens when in a simulation: the paper's procedure (section III.A).
+
+    Attributes:
+        startup: Standing in the posture of the first stride [s].
+        practice: Pronking without learning [s].
+        learning: Pronking with the law switched on [s].
+        scatter: Standard deviation of the joint angles at the start [rad].
+    """
+
+    startup: float = 0.5
+    practice: float = 20.0
+    learning: float = 20.0
+    scatter: float = 0.01
+
+    def __post_init__(self) -> None:
+        values = (self.startup, self.practice, self.learning, self.scatter)
+        if not all(0.0 <= value < np.inf for value in values):
+            raise InvalidInput(
+                "the durations and the scatter of a schedule must be finite and not negative"
+            )
+        if self.practice + self.learning < _SHORTEST:
+            raise InvalidInput(
+                f"practice and learning of {self.practice:g} + {self.learning:g} s are too short "
+                f"for a stride; make them {_SHORTEST:g} s or more together"
+            )
+
+    @property
+    def duration(self) -> float:
+        """Duration of the whole simulation [s]."""
+        return self.startup + self.practice + self.learning
