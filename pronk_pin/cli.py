@@ -56,7 +56,7 @@ from .robot import load_robot
 from .viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
 from .viz.explanation_figure import write_explanation_figure
 from .viz.gait_figures import write_gait_figures
-from .viz.learning_figures import write_prediction, write_seeding
+from .viz.learning_figures import errors_by_seed, predicted_and_measured
 from .viz.practice import practice_programme
 from .viz.report import write_figures, write_report
 from .viz.skill_figures import gains_figure, transfers_figure
@@ -434,7 +434,7 @@ class Analyze:
         for speed in self.speed:
             predictions.append(compare_prediction(spec, made, speed, scenario, number=self.strides))
             print(describe_prediction(predictions[-1]), end="\n\n")
-        print(f"figure  {write_prediction(predictions, self.figure)}")
+        print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -517,7 +517,7 @@ class Seeding:
         """Do it."""
         table = measure_seeding(self.speed, load_scenario(self.scenario), robot=self.robot)
         print(describe_seeding(table))
-        print(f"figure  {write_seeding(table, self.figure)}")
+        print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
 
 
 @dataclass(frozen=True)

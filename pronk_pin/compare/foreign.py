@@ -17,7 +17,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from ..errors import FileProblem, InvalidInput
+from ..errors import FileProblem, InvalidInput, reading
 from ..parity import SIX_DIGITS, Parity, compare_models
 from ..robot import Robot
 
@@ -104,12 +104,10 @@ class ForeignRobot:
         Raises:
             InvalidInput: The text is something else.
         """
-        try:
+        with reading("a record of an MJCF", "make it again"):
             values = json.loads(text)
             parity = Parity.from_json(json.dumps(values["parity"]))
             return cls(str(values["path"]), str(values["sha256"]), parity)
-        except (KeyError, TypeError, ValueError) as error:
-            raise InvalidInput(f"this is no record of an MJCF ({error}); make it again") from error
 
 
 def mjcf_sha256(path: Path | str) -> str:

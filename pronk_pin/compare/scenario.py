@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..errors import InvalidInput, UnknownName
+from ..errors import InvalidInput, UnknownName, reading
 from .mismatch import KNOWN, ROTOR
 from .sensors import Sensors
 
@@ -126,14 +126,10 @@ class Scenario:
         Raises:
             InvalidInput: The text is something else.
         """
-        try:
+        with reading("a scenario", "make the strides again"):
             values = json.loads(text)
             vectors = {name: tuple(values[name]) for name in _VECTORS}
             return cls(**{**values, **vectors, "sensors": Sensors(**values["sensors"])})
-        except (KeyError, TypeError, ValueError) as error:
-            raise InvalidInput(
-                f"this is not a scenario ({error}); make the strides again"
-            ) from error
 
     def _check_ground(self) -> None:
         if not self.ground_time_constant >= 2 * self.timestep:

@@ -7,7 +7,7 @@ the tapes; the controller is called at each touchdown, lift-off and landing of a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -112,27 +112,18 @@ FLIGHT_LAW = PDTypeILC(
 )
 """Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
 
+_PRACTICE = ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming())
+"""Learning from nothing, over the whole stride."""
+
 CONTROLLERS = {
     spec.name: spec
     for spec in (
         ControllerSpec("pd"),
-        ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming()),
+        _PRACTICE,
         ControllerSpec("model", source="model"),
         ControllerSpec("library", source="library", timing=FlightTiming()),
-        ControllerSpec(
-            "model+ilc",
-            source="model",
-            law=PDTypeILC(),
-            flight_law=FLIGHT_LAW,
-            timing=FlightTiming(),
-        ),
-        ControllerSpec(
-            "library+ilc",
-            source="library",
-            law=PDTypeILC(),
-            flight_law=FLIGHT_LAW,
-            timing=FlightTiming(),
-        ),
+        replace(_PRACTICE, name="model+ilc", source="model"),
+        replace(_PRACTICE, name="library+ilc", source="library"),
         ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
@@ -140,9 +131,7 @@ CONTROLLERS = {
         ControllerSpec("identified", source="identified"),
         ControllerSpec("identified+gait", source="identified", mended_gaits=True),
         ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
-        ControllerSpec(
-            "ilc-imu", law=PDTypeILC(), flight_law=FLIGHT_LAW, imu=True, timing=FlightTiming()
-        ),
+        replace(_PRACTICE, name="ilc-imu", imu=True),
         ControllerSpec("model+timing", source="model", timing=FlightTiming()),
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )

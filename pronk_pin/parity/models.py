@@ -22,7 +22,7 @@ import numpy as np
 import pinocchio as pin
 
 from .._typing import Array
-from ..errors import FileProblem, InvalidInput
+from ..errors import FileProblem, InvalidInput, reading
 from ..robot import Robot
 from .mechanism import FLOATING, Mechanism, Point, State, read_pinocchio
 from .mechanism_mujoco import read_mujoco
@@ -89,14 +89,10 @@ class Parity:
         Raises:
             InvalidInput: The text is something else.
         """
-        try:
+        with reading("a comparison of models", "make it again"):
             values = json.loads(text)
             rows = tuple(Row(**_read_again(row)) for row in values["rows"])
             return cls(**{**values, "rows": rows})
-        except (KeyError, TypeError, ValueError) as error:
-            raise InvalidInput(
-                f"this is not a comparison of models ({error}); make it again"
-            ) from error
 
     def table(self, *, full: bool = False) -> str:
         """The comparison as text.

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from ..compare.tables import SHOWN
 from ..compare.transfer import TOLERANCE
 from .style import ACCENT, PALETTE, TWO_COLUMNS, legend_below, look, new_figure, styled
 
-_JOINTS = ("calf", "thigh")
 _WAYS = ((False, "pd", "these gains alone"), (True, "ilc", "with what was learned"))
 _TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 
@@ -23,7 +23,7 @@ def gains_figure(table: pd.DataFrame) -> Figure:
     """
     figure = new_figure(TWO_COLUMNS, 2.7)
     panels = figure.subplots(1, 2, sharey=True)
-    for axes, joint in zip(panels, _JOINTS, strict=True):
+    for axes, joint in zip(panels, SHOWN, strict=True):
         for learned, name, label in _WAYS:
             rows = table[table["learned"] == learned].sort_values("share")
             style, share = look(name), 100.0 * rows["share"]
@@ -54,7 +54,7 @@ def transfers_figure(table: pd.DataFrame) -> Figure:
     figure = new_figure(TWO_COLUMNS, 1.3 + 0.24 * len(table))
     panels = figure.subplots(1, 2, sharey=True)
     place = np.arange(len(table))
-    for axes, joint in zip(panels, _JOINTS, strict=True):
+    for axes, joint in zip(panels, SHOWN, strict=True):
         practised = table[f"{joint}_practised"].to_numpy()
         for row, (stored, anew) in enumerate(zip(table[joint], practised, strict=True)):
             axes.plot([anew, stored], [row, row], color="0.75", lw=1.5, zorder=1)
