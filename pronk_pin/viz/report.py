@@ -7,34 +7,27 @@ from __future__ import annotations
 
 import shlex
 import textwrap
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
 
 from ..compare import ForeignRobot, Results
 from ..compare.limits import limitations
-from ..compare.practice import RIVAL, VARIABLES, Practice, practice
+from ..compare.practice import VARIABLES, Practice, practice
 from ..compare.statistics import CONFIDENCE, LEAST_UNITS, family, sampled
 from ..compare.suites import SUITES, load_suite
-from ..compare.tables import SHOWN, WORLD, answer, beside_the_paper, sampled_worlds
+from ..compare.tables import SHOWN, answer, beside_the_paper, sampled_worlds
 from ..compare.words import (
     LEARNER,
-    against_model,
-    beat_text,
-    between,
     families,
-    number,
     suite_verdict,
     verdict,
 )
 from ..errors import cannot_write
-from ..parity import Parity, Row, format_value, merged
-from . import figures, suite_figures
+from . import figures, report_tables, suite_figures
 from .document import Document
-from .style import in_order, save_figure
+from .style import save_figure
 
 SHOWN_SPEED = 0.3
 """Speed of the tracking figure [m/s]: the paper's."""
@@ -176,7 +169,7 @@ def _all_worlds(document: Document, results: Results, table: pd.DataFrame) -> No
     controllers = set(table.index.get_level_values("controller"))
     if LEARNER in controllers:
         document.text("A row a world: peak error under practice (ILC) beside PD and the model.")
-        document.table(_world_rows(table))
+        document.table(report_tables.by_world(table))
     for name, (figure, caption) in _suite_figures(results, table).items():
         document.picture(name, figure, caption)
 
@@ -212,29 +205,6 @@ def _practice_figures(results: Results) -> dict[str, tuple[Figure, str]]:
     }
 
 
-def _world_rows(table: pd.DataFrame) -> pd.DataFrame:
-    """One row a world about `ilc`, beside `pd` and `model`."""
-    rows = {}
-    for world, row in table.xs(LEARNER, level="controller").iterrows():
-        cells: dict[str, str] = {}
-        for joint in SHOWN:
-            for other in ("pd", RIVAL):
-                if (world, other) in table.index:
-                    value = table.loc[(world, other), joint]
-                    cells[f"{joint} [rad]: {figures.LABELS[other]}"] = number(value, ".4f")
-            cells[f"{joint} [rad]: ILC"] = _with_interval(row, joint, ".4f")
-        cells["better than model (calf/thigh)"] = against_model(row)
-        cells["strides to beat it"] = beat_text(row)
-        rows[str(world)] = cells
-    return pd.DataFrame.from_dict(rows, orient="index")
-
-
-def _with_interval(row: pd.Series, name: str, form: str) -> str:
-    """A mean with its interval: "0.0224 (0.0216 to 0.0237)"."""
-    value, ends = number(row.get(name, float("nan")), form), between(row, name, form)
-    return value if ends == "-" else f"{value} ({ends})"
-
-
 def _world(
     document: Document, results: Results, summary: pd.DataFrame, table: pd.DataFrame, world: str
 ) -> None:
@@ -245,8 +215,8 @@ def _world(
     document.heading(f'Controllers in the {where} "{world}"', world)
     if len(worlds) > 1:
         document.text(verdict(summary, scenario=world, table=table.loc[world]))
-    document.table(_errors(table.loc[world]))
-    document.table(_motion(table.loc[world]))
+    document.table(report_tables.errors(table.loc[world]))
+    document.table(report_tables.motion(table.loc[world]))
     units = sorted(set(table.loc[world]["unit"]))
     document.text(f"Intervals are drawn over the {' and '.join(units)}s.", "note")
     if sampled(world):
@@ -258,7 +228,7 @@ def _world(
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
     if {"pd", LEARNER} <= set(results.experiment.controllers):
         document.heading("Table I, beside the paper's", f"{world}-table", level=3)
-        document.table(_table_1(beside_the_paper(summary, scenario=world)))
+        document.table(report_tables.table_1(beside_the_paper(summary, scenario=world)))
         document.text(
             "The last row holds the means of the peaks, and the reduction of the mean (the paper "
             "prints the mean of its reductions: 75.8 % and 30.8 %).",
@@ -294,54 +264,19 @@ def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
     if parity.reason:
         document.text(f"M, h and J are not compared: {parity.reason}.")
     else:
-        document.table(_dynamics(parity))
+        document.table(report_tables.dynamics(parity))
     if parity.differences:
         document.text(
             "Links and joints go by the joint that moves them. An inertia is (xx, yy, zz, xy, xz, "
             "yz) about the centre of mass, in the trunk's axes at zero joint angles.",
             "note",
         )
-        document.table(_differing(parity.differences), wrap=True)
+        document.table(report_tables.differing(parity.differences), wrap=True)
     actuators = sorted({str(row.b) for row in parity.rows if row.what == "actuator"} - {"motor"})
     if actuators:
         document.text(
             f"Its actuators ({'; '.join(actuators)}) are played as torque motors.", "note"
         )
-
-
-def _dynamics(parity: Parity) -> pd.DataFrame:
-    """How far the equations of motion are apart."""
-    rows = {
-        "mass matrix M": (parity.mass_matrix, "|dM_ij| / sqrt(M_ii M_jj)"),
-        "forces h = H v + G": (parity.bias, "|dh_i| / max |h_i|"),
-        "Jacobian J of the feet": (parity.jacobian, "|dJ_ij| / max |J|"),
-    }
-    return pd.DataFrame.from_dict(
-        {
-            name: ["-" if value is None else f"{value:.2g}", scale]
-            for name, (value, scale) in rows.items()
-        },
-        orient="index",
-        columns=[f"largest on {parity.states} random states", "measured as"],
-    )
-
-
-def _differing(differences: Sequence[Row]) -> pd.DataFrame:
-    """Rows of a parity table by quantity, those that say the same of several joints as one."""
-    quantities = list(dict.fromkeys(row.what for row in differences))
-    rows = sorted(merged(differences), key=lambda row: quantities.index(row.what))
-    cells = [
-        {
-            "where": row.where,
-            "model": format_value(row.a),
-            "simulated": format_value(row.b),
-            "difference": number(row.difference, ".3g"),
-        }
-        for row in rows
-    ]
-    units = [f" [{row.unit}]" if row.unit else "" for row in rows]
-    index = [row.what + unit for row, unit in zip(rows, units, strict=True)]
-    return pd.DataFrame(cells, index=index)
 
 
 def _sampled(document: Document, results: Results, summary: pd.DataFrame, world: str) -> None:
@@ -353,70 +288,11 @@ def _sampled(document: Document, results: Results, summary: pd.DataFrame, world:
         "What is drawn of each world, and the mean peaks in it in milliradians, over the robots "
         "that did not fall; in the order of the figure."
     )
-    document.table(_each_world(table))
+    document.table(report_tables.each_world(table))
     if len(families(results.experiment.scenarios)) > 1:
         return  # practice has its figures for all worlds
     for name, (figure, caption) in _practice_figures(results).items():
         document.picture(name, figure, caption)
-
-
-def _each_world(table: pd.DataFrame) -> pd.DataFrame:
-    """The table of `sampled_worlds` as texts."""
-    shown = {}
-    for attribute, (label, factor, form) in WORLD.items():
-        shown[label] = [number(factor * value, form) for value in table["world", attribute]]
-    for joint in SHOWN:
-        for controller in in_order(table[joint].columns):
-            label = f"{joint}: {figures.LABELS.get(controller, controller)}"
-            shown[label] = [number(1e3 * value, ".1f") for value in table[joint, controller]]
-    if table["fallen"].to_numpy().any():
-        for controller in table["fallen"].columns:
-            label = f"fell: {figures.LABELS.get(controller, controller)}"
-            shown[label] = [f"{count:.0f}" for count in table["fallen", controller]]
-    return pd.DataFrame(shown, index=table.index.rename(None))
-
-
-def _errors(table: pd.DataFrame) -> pd.DataFrame:
-    """Errors of the controllers in a world, with intervals."""
-    rows = {}
-    for name, row in table.iterrows():
-        cells: dict[str, str] = {}
-        for joint in SHOWN:
-            cells[f"{joint}: peak [rad]"] = _with_interval(row, joint, ".4f")
-            cells[f"{joint}: less than PD"] = _with_interval(row, f"{joint}_reduction", ".0%")
-            cells[f"{joint}: wins against model"] = _with_interval(row, f"{joint}_wins", ".0%")
-        rows[figures.LABELS.get(str(name), str(name))] = cells
-    return pd.DataFrame.from_dict(rows, orient="index")
-
-
-def _motion(table: pd.DataFrame) -> pd.DataFrame:
-    """What else is to be known of the controllers in a world."""
-    rows = {}
-    for name, row in table.iterrows():
-        cells = {f"{joint}: RMS [rad]": number(row[f"{joint}_rms"], ".4f") for joint in SHOWN}
-        cells["better than model (calf/thigh)"] = against_model(row)
-        cells["strides to beat it"] = beat_text(row)
-        cells["strides to converge"] = number(row["strides"], ".0f")
-        cells["feedback's share"] = number(row["feedback"], ".0%")
-        cells["cost of transport"] = number(row["cost"], ".2f")
-        cells["speed error [m/s]"] = number(row["speed_error"], ".3f")
-        cells["apex error [mm]"] = number(1e3 * row["apex_error"], ".1f")
-        cells["upright"] = f"{row['upright']:.0f} of {row['robots']:.0f}"
-        rows[figures.LABELS.get(str(name), str(name))] = cells
-    return pd.DataFrame.from_dict(rows, orient="index")
-
-
-def _table_1(table: pd.DataFrame) -> pd.DataFrame:
-    shown = table.copy().astype(object)
-    for column in table.columns:
-        form = ".0%" if column[2] == "reduction" else ".3f"
-        shown[column] = [number(value, form) for value in table[column]]
-    names = {"ours": "this run", "paper": "paper"}
-    shown.columns = pd.MultiIndex.from_tuples(
-        [(f"{joint} [rad]", names[source], name) for joint, source, name in shown.columns]
-    )
-    shown.index = pd.Index([s if isinstance(s, str) else f"{s:g}" for s in table.index])
-    return shown
 
 
 def _provenance(document: Document, results: Results) -> None:
@@ -432,7 +308,7 @@ def _provenance(document: Document, results: Results) -> None:
     for k, run in enumerate(runs):
         if len(runs) > 1:
             document.heading(f"Run {k + 1} of {len(runs)}", f"run-{k + 1}", level=3)
-        rows = pd.DataFrame.from_dict(_run(run), orient="index", columns=[""])
+        rows = pd.DataFrame.from_dict(report_tables.provenance(run), orient="index", columns=[""])
         document.table(rows, left=True)
     seeds = ", ".join(map(str, results.experiment.seeds))
     if results.foreign is not None:
@@ -441,21 +317,3 @@ def _provenance(document: Document, results: Results) -> None:
             f"`{results.foreign.sha256}`."
         )
     document.text(f"Seeds: {seeds}. One stream a seed, the same for every controller.")
-
-
-def _run(run: dict[str, Any]) -> dict[str, str]:
-    cells = run.get("cells", {})
-    simulated = sum(times["simulation_s"] for times in cells.values())
-    encoded = sum(times["encoding_s"] for times in cells.values())
-    wall = f"{run['wall_time_s']:g} s" if "wall_time_s" in run else "not finished"
-    return {
-        "began": run["started"],
-        "wall time": f"{wall}; {len(cells)} cells, {simulated:.0f} s simulating and "
-        f"{encoded:.0f} s packing their files; summary {run.get('summary_s', float('nan')):g} s",
-        "by": run["executor"],
-        "versions": ", ".join(f"{name} {version}" for name, version in run["versions"].items()),
-        "source": run["git"] or "not under version control",
-        "Python": run["python"],
-        "system": run["platform"],
-        "CPU": f"{run['cpu']} ({run['cores']} cores)",
-    }
