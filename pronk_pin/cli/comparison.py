@@ -1,0 +1,177 @@
+"""Commands about comparisons and their results: `compare | reproduce | report | explain`."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from tyro.conf import Positional, arg
+
+from ..compare import Experiment, Results, default_folder, describe, explain, run_experiment
+from ..compare.changes import format_changes
+from ..compare.closing import close_loop, format_loop
+from ..compare.reproduce import format_reproduction
+from ..compare.suites import load_suite
+from ..compare.words import families, format_suite, format_tables
+from ..errors import InvalidInput
+from ..model_files import write_mjcf, write_urdf
+from ..viz import write_replay
+from ..viz.explanation_figure import write_explanation_figure
+from ..viz.practice import practice_programme
+from ..viz.report import write_figures, write_report
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Run the comparison: simulate, print the table, write report and replay.
+
+    Run it again with the same --folder and it completes what is missing.
+    """
+
+    experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
+    """What to compare."""
+    suite: str = "default"
+    """A named experiment, which the other options change: default, mismatch, sampled, control,
+    paper."""
+    folder: Path | None = None
+    """Results folder; by default results/<time>-comparison."""
+    workers: int | None = None
+    """Processes; by default one for each core."""
+    executor: str | None = None
+    """Who simulates instead of these processes: dask://HOST:PORT of a dask scheduler."""
+
+    def run(self) -> None:
+        """Do it."""
+        name = "comparison" if self.suite == "default" else self.suite
+        folder = self.folder or default_folder(name)
+        foreign = Results.create(self.experiment, folder).foreign
+        if foreign is not None:
+            print(foreign.parity.table())
+        results = run_experiment(
+            self.experiment, folder, workers=self.workers, executor=self.executor
+        )
+        print(f"robot {self.experiment.robot}, base {self.experiment.base}\n")
+        _print_tables(results)
+        _write_pages(results)
+
+
+@dataclass(frozen=True)
+class Reproduce:
+    """Print the paper's Table I row by row beside ours, and which of its metrics could be meant.
+
+    Runs the suite "paper": PD, ILC and the paper's own law at its speeds, with several seeds.
+    """
+
+    folder: Path | None = None
+    """Results folder; by default results/<time>-paper. One that is there is completed."""
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    """Seeds of the scatter at the start; intervals need five."""
+    workers: int | None = None
+    """Processes; by default one for each core."""
+
+    def run(self) -> None:
+        """Do it."""
+        experiment = dataclasses.replace(load_suite("paper"), seeds=self.seeds)
+        folder = self.folder or default_folder("paper")
+        results = run_experiment(experiment, folder, workers=self.workers)
+        learners = tuple(name for name in experiment.controllers if name != "pd")
+        print(format_reproduction(results, learners=learners))
+        print(f"\nresults  {results.folder}")
+
+
+@dataclass(frozen=True)
+class Report:
+    """Write the report and the replay of a result again, and print its tables.
+
+    With two results, say what is different in the second beyond noise.
+    """
+
+    result: Positional[Path]
+    """Results folder."""
+    other: Positional[Path | None] = None
+    """Results folder to compare it with."""
+    figures: Path | None = None
+    """Write the figures into this folder too, as SVG."""
+
+    def run(self) -> None:
+        """Do it."""
+        results = Results.load(self.result)
+        if self.other is not None:
+            print(format_changes(results, Results.load(self.other)))
+            return
+        _print_tables(results)
+        _write_pages(results)
+        if self.figures is not None:
+            for path in write_figures(results, self.figures):
+                print(f"figure   {path}")
+
+
+@dataclass(frozen=True)
+class Explain:
+    """Take the learned torque of a result apart: rotors, friction, load, motors, and the rest.
+
+    Prints what the model lacks, with intervals, how much of the learned torque each cause explains,
+    and what cannot be told apart. The mended model can be written to a file, and tried out.
+    """
+
+    result: Positional[Path]
+    """Results folder."""
+    controller: str = "ilc"
+    """Whose strides."""
+    scenario: str | None = None
+    """In which scenario; by default the first."""
+    figure: Path | None = None
+    """Draw the learned torque by cause into this file: png, svg or pdf."""
+    speed: float | None = None
+    """Speed that the figure shows [m/s]; by default the one nearest to 0.5."""
+    write_urdf: Path | None = None
+    """Write the mended model to this URDF."""
+    write_mjcf: Path | None = None
+    """Write the mended model to this MJCF."""
+    close_loop: bool = False
+    """Try the mended model, with its gaits optimised again, beside the model, the torque library
+    and practice, at speeds halfway between those of the result and with 3 kg more."""
+    imu_noise: float = 0.0
+    """Standard deviation of noise added to the trunk's acceleration [m/s^2]."""
+    draws: int = 300
+    """How often strides are drawn anew for the intervals."""
+    seed: int = 0
+    """Seed of the draws and the noise."""
+
+    def run(self) -> None:
+        """Do it."""
+        if self.seed < 0:
+            raise InvalidInput(f"seed={self.seed}; give a number from 0 on")
+        results = Results.load(self.result)
+        cell = results.find(controller=self.controller, scenario=self.scenario)
+        strides, rng = results.strides(cell), np.random.default_rng(self.seed)
+        found = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
+        print(f"{cell.controller} in scenario {cell.scenario}\n\n{describe(found)}")
+        if self.figure is not None:
+            print(f"\nfigure  {write_explanation_figure(found, self.figure, speed=self.speed)}")
+        notes = [f"{found.robot.name}, mended by what practice found", "", describe(found)]
+        if self.write_urdf is not None:
+            print(f"\nurdf    {write_urdf(found.mended, self.write_urdf, notes)}")
+        if self.write_mjcf is not None:
+            print(f"\nmjcf    {write_mjcf(found.mended, self.write_mjcf, notes)}")
+        if self.close_loop:
+            print(f"\n{format_loop(close_loop(found, strides, rng=rng))}")
+
+
+def _print_tables(results: Results) -> None:
+    """Table I, overview and verdict of one world; the overviews of many and one verdict."""
+    summary, worlds = results.summary(), families(results.experiment.scenarios)
+    if len(worlds) > 1:
+        print(format_suite(summary))
+    else:
+        print(format_tables(summary, scenario=worlds[0]))
+
+
+def _write_pages(results: Results) -> None:
+    """The report and the replay of a result, with their names printed."""
+    print(f"\nresults  {results.folder}")
+    print(f"report   {write_report(results)}")
+    print(f"replay   {write_replay(practice_programme(results), results.folder / 'replay.html')}")

@@ -1,0 +1,147 @@
+"""Commands about gait libraries: `gaits build | show | plot`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, subcommand
+
+from ..gait import (
+    GaitLibrary,
+    build_library,
+    describe_gait,
+    describe_library,
+    known_base,
+    load_library,
+    number_range,
+)
+from ..robot import load_robot
+from ..viz.gait_figures import write_gait_figures
+
+
+@dataclass(frozen=True)
+class Build:
+    """Optimise a gait library anew, from one gait outward.
+
+    Each gait is kept in a folder as soon as it is solved: run the same command again, and it
+    completes what is missing.
+    """
+
+    robot: str = "a1"
+    """Robot."""
+    gait: str = "pronk"
+    """Which gait: pronk or bound."""
+    base: str | None = None
+    """How the trunk may move: locked (x and z only) or sagittal (pitching too); by default the
+    gait's own."""
+    speeds: tuple[str, ...] = ()
+    """Speeds [m/s], each a number or a range A:B:STEP; by default the gait's own."""
+    apex: tuple[str, ...] = ()
+    """Greatest heights of the trunk [m], each a number or a range A:B:STEP; by default the
+    gait's own."""
+    output: Path = Path("gaits.npz")
+    """File to write."""
+    folder: Path | None = None
+    """Where each gait is kept; by default beside the output, with '.build' to its name."""
+    workers: int | None = None
+    """Processes; by default one for each core."""
+
+    def run(self) -> None:
+        """Do it."""
+        folder = self.folder or self.output.with_name(self.output.name + ".build")
+        base = None if self.base is None else known_base(self.base)
+        library = build_library(
+            load_robot(self.robot),
+            number_range("speeds", self.speeds) or None,
+            apexes=number_range("apex", self.apex) or None,
+            gait=self.gait,
+            base=base,
+            path=self.output,
+            folder=folder,
+            workers=self.workers,
+        )
+        print(describe_library(library))
+        print(f"\ngaits   {self.output}\nfolder  {folder}  (each gait; no longer needed)")
+
+
+@dataclass(frozen=True)
+class _OfLibrary:
+    """Which gaits of which library a command looks at."""
+
+    apex: float | None = None
+    """Greatest height of the trunk [m]; by default the library's own."""
+    library: Path | None = None
+    """Library file; by default the shipped one."""
+    robot: str = "a1"
+    """Robot whose shipped library it is."""
+    gait: str = "pronk"
+    """Which of its gaits: pronk or bound."""
+    base: str | None = None
+    """How the trunk may move in it; by default the gait's own."""
+
+    def load(self) -> GaitLibrary:
+        """The library, even one that failed its audit."""
+        return open_library(self.library, self.robot, self.gait, self.base, audited=False)
+
+
+@dataclass(frozen=True)
+class Show(_OfLibrary):
+    """Print the proof of a gait library: violations, residuals, drift, limits."""
+
+    speed: Positional[float | None] = None
+    """One gait in detail [m/s]; by default a line for each."""
+
+    def run(self) -> None:
+        """Do it."""
+        library = self.load()
+        if self.speed is None:
+            print(describe_library(library))
+        else:
+            print(describe_gait(library, self.speed, self.apex))
+
+
+@dataclass(frozen=True)
+class Plot(_OfLibrary):
+    """Draw a gait library: joints, torques, forces and trunk over the stride, and a side view."""
+
+    speed: Positional[float | None] = None
+    """Speed of the side view [m/s]; by default the one nearest to 0.5."""
+    folder: Path = Path("figures")
+    """Where to write the figures."""
+    format: str = "png"
+    """Format of the figures: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        paths = write_gait_figures(
+            self.load(), self.folder, speed=self.speed, apex=self.apex, suffix=self.format
+        )
+        for path in paths:
+            print(f"figure  {path}")
+
+
+@dataclass(frozen=True)
+class Gaits:
+    """Build, show or plot the gait library."""
+
+    action: (
+        Annotated[Build, subcommand("build")]
+        | Annotated[Show, subcommand("show")]
+        | Annotated[Plot, subcommand("plot")]
+    )
+
+    def run(self) -> None:
+        """Do it."""
+        self.action.run()
+
+
+def open_library(
+    path: Path | None, robot: str, gait: str, base: str | None, *, audited: bool = True
+) -> GaitLibrary:
+    """A library from a file, or one that is shipped."""
+    if path is not None:
+        return GaitLibrary.load(path, audited=audited)
+    load_robot(robot)
+    return load_library(robot, gait=gait, base=None if base is None else known_base(base))

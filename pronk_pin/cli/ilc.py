@@ -1,0 +1,160 @@
+"""Commands about learning: `ilc analyze | gains | transfer | seeding`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, subcommand
+
+from ..compare import Results
+from ..compare.gains import describe_gains, sweep_gains
+from ..compare.prediction import compare_prediction, describe_prediction, practise, stored_practice
+from ..compare.scenario import load_scenario
+from ..compare.seeding import describe_seeding, measure_seeding
+from ..compare.transfer import describe_transfers, measure_transfers
+from ..control import load_controller
+from ..errors import InvalidInput
+from ..viz.learning_figures import errors_by_seed, predicted_and_measured
+from ..viz.skill_figures import gains_figure, transfers_figure
+from ..viz.style import save_figure
+
+
+@dataclass(frozen=True)
+class Analyze:
+    """Say what a learning law will do along a gait, and lay what it did beside it.
+
+    Prints stability, transient growth, what is left of the error, and robustness, all from the
+    lifted model; then the predicted error of each stride beside the measured one.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller whose law of the stance is analysed."""
+    speed: tuple[float, ...] = (0.0,)
+    """Speeds [m/s]."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    result: Path | None = None
+    """Results folder with a practice of a law of the stance only, as ilc-stance; by default a short
+    one is simulated."""
+    strides: int = 20
+    """Strides of learning to compare."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("analysis.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        if self.strides < 1:
+            raise InvalidInput(f"strides={self.strides}; give 1 or more")
+        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        if self.result is None:
+            made = practise(spec, self.speed, scenario, robot=self.robot, strides=self.strides)
+        else:
+            made = stored_practice(Results.load(self.result), spec, self.speed, scenario)
+        predictions = []
+        for speed in self.speed:
+            predictions.append(compare_prediction(spec, made, speed, scenario, number=self.strides))
+            print(describe_prediction(predictions[-1]), end="\n\n")
+        print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Tell whether learning permits smaller feedback gains, as the paper claims.
+
+    Practises once, then replays what was learned with smaller gains, beside the same gains alone.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller that practises."""
+    speed: tuple[float, ...] = (-0.4, 0.0, 0.4, 0.8)
+    """Speeds [m/s]."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("gains.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        table = sweep_gains(spec, self.speed, scenario, robot=self.robot)
+        print(describe_gains(table))
+        print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """Tell where a stored skill may be reused, and where it has to be practised again.
+
+    Learns at home, replays the torque library at home, at speeds that were left out, and in other
+    worlds, and compares with practice there.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller that practises."""
+    speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+    """Speeds [m/s], increasing."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    worlds: tuple[str, ...] = ("payload", "weak-motors", "soft-ground", "slope", "gravity")
+    """Worlds in which the skill is tried."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("transfer.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        table = measure_transfers(
+            load_controller(self.controller),
+            self.speed,
+            load_scenario(self.scenario),
+            [load_scenario(name) for name in self.worlds],
+            robot=self.robot,
+        )
+        print(describe_transfers(table))
+        print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
+
+
+@dataclass(frozen=True)
+class Seeding:
+    """Tell what a seed saves: learning from nothing, from the model, and from neighbouring speeds.
+
+    The torque library practises at all speeds; each inner one begins with its neighbours' torques.
+    """
+
+    speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+    """Speeds [m/s], increasing."""
+    scenario: str = "nominal"
+    """World of the practice."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("seeding.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        table = measure_seeding(self.speed, load_scenario(self.scenario), robot=self.robot)
+        print(describe_seeding(table))
+        print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
+
+
+@dataclass(frozen=True)
+class Ilc:
+    """Analyse learning laws, and what learning is good for."""
+
+    action: (
+        Annotated[Analyze, subcommand("analyze")]
+        | Annotated[Gains, subcommand("gains")]
+        | Annotated[Transfer, subcommand("transfer")]
+        | Annotated[Seeding, subcommand("seeding")]
+    )
+
+    def run(self) -> None:
+        """Do it."""
+        self.action.run()

@@ -1,0 +1,97 @@
+"""The command `view`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from ..compare import Results
+from ..viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
+from ..viz.practice import practice_programme
+from .gaits import open_library
+
+
+@dataclass(frozen=True)
+class View:
+    """Show a motion: a result's robots beside their references, or a library's gaits.
+
+    Without --html, --png, --gif or --mp4, on a live page with controls.
+    """
+
+    what: Positional[Path | None] = None
+    """Results folder or gait library; by default the shipped gaits."""
+    speed: float | None = None
+    """Which speed [m/s]; by default the one nearest to 0.5."""
+    apex: float | None = None
+    """Which apex of a gait library [m]; by default the library's own."""
+    controller: str | None = None
+    """Which controller of a result; by default ilc."""
+    scenario: str | None = None
+    """Which scenario of a result; by default the first."""
+    beside: str | None = None
+    """What to show beside it: another controller of the result, or 'before learning'."""
+    stride: int | None = None
+    """Show the dozen strides of a result with this one; by default those around the start of
+    learning."""
+    robot: str = "a1"
+    """Robot whose shipped gaits are shown."""
+    gait: str = "pronk"
+    """Which of its shipped gaits: pronk or bound."""
+    base: str | None = None
+    """How the trunk may move in it, locked or sagittal; by default the gait's own."""
+    port: int | None = None
+    """Port of the page; by default a free one."""
+    host: str = "127.0.0.1"
+    """Address that the page listens on; the default can be reached from this machine only."""
+    open: bool = True
+    """Open the page in the browser."""
+    duration: float | None = None
+    """End the page after so many seconds; by default on Ctrl-C."""
+    html: Path | None = None
+    """Write the page to this file instead: it opens offline."""
+    png: Path | None = None
+    """Write a picture to this file instead."""
+    gif: Path | None = None
+    """Write an animation to this file instead."""
+    mp4: Path | None = None
+    """Write a video to this file instead."""
+    film: Annotated[Film, arg(name="")] = field(default_factory=Film)
+    """What pictures and films are like."""
+
+    def run(self) -> None:
+        """Do it."""
+        programme = self._programme()
+        if self.html is not None:
+            print(f"replay  {write_replay(programme, self.html)}")
+        if self.png is not None:
+            print(f"picture {write_png(programme.scene(), self.png, self.film)}")
+        for path in (self.gif, self.mp4):
+            if path is not None:
+                print(f"film    {write_film(programme.scene(), path, self.film)}")
+        if all(path is None for path in (self.html, self.png, self.gif, self.mp4)):
+            serve(
+                programme,
+                port=self.port,
+                host=self.host,
+                open_browser=self.open,
+                duration=self.duration,
+            )
+
+    def _programme(self) -> Programme:
+        if self.what is not None and self.what.is_dir():
+            return practice_programme(
+                Results.load(self.what),
+                speed=self.speed,
+                controller=self.controller,
+                scenario=self.scenario,
+                beside=self.beside,
+                stride=self.stride,
+            )
+        return library_programme(
+            open_library(self.what, self.robot, self.gait, self.base),
+            speed=self.speed,
+            apex=self.apex,
+        )
