@@ -84,7 +84,7 @@ def measure_transfers(
     learned = _errors(practice)
 
     def row(task: str, replayed: Array, practised: Array, reuse: bool) -> dict[str, object]:
-        gains_little = _rms(replayed) <= (1.0 + TOLERANCE) * _rms(practised)
+        gains_little = may_be_reused(replayed, practised)
         peaks = {"thigh": replayed[0], "calf": replayed[1]}
         peaks |= {"thigh_practised": practised[0], "calf_practised": practised[1]}
         return {"task": task, **peaks, "reuse": reuse, "right": reuse == gains_little}
