@@ -52,12 +52,12 @@ class Player:
         ticks: Length of the longest tape.
         rng: Source of the sensors' noise.
         base: How the trunks may move, see `build_model`.
+        balance: What keeps a trunk up that may turn; None where it is locked.
         chunked: Play many ticks at once where that is possible; the motion is the same.
 
     Attributes:
         world: The robots in MuJoCo.
         motors, sensors: Theirs.
-        balance: What keeps a trunk up that may turn; None where it is locked.
         log: The phase that they are in, as it truly is.
         seen: The same as the robots know it: the log itself, where nothing is noisy.
         upright: Which robots have not fallen, shape (n,).
@@ -73,10 +73,11 @@ class Player:
         ticks: int,
         rng: np.random.Generator,
         base: str,
+        balance: Balance | None,
         chunked: bool,
     ) -> None:
         n, dt = len(gaits), scenario.timestep
-        turns = base != "locked"
+        turns = balance is not None
         chunked = chunked and not turns
         self._gains, self._tau_max, self._imu = spec.gains, robot.tau_max, spec.imu
         self._servos = chunked and scenario.affine
@@ -89,11 +90,7 @@ class Player:
         self.log = self.seen = TickLog(n, ticks, turns=turns)
         if not self._servos and not self._ahead:
             self.seen = TickLog(n, ticks, turns=turns)
-        self.balance = None
-        if turns:
-            self.balance = Balance(
-                robot, gaits, spec.balance, gains=spec.gains, ticks=ticks, timestep=dt
-            )
+        self._balance = balance
         self._late = spec.touchdown_ticks
         self._load = spec.contact.touchdown * robot.mass * robot.gravity
         flight = np.array([gait.flight.duration for gait in gaits])
@@ -182,10 +179,10 @@ class Player:
         feedback = self._gains.feedback(
             tape.position[going, tick] - joints, tape.velocity[going, tick] - rates
         )
-        if self.balance is not None:
+        if self._balance is not None:
             balance = np.zeros_like(feedback)
             if part is not None:
-                balance = self.balance.torque(
+                balance = self._balance.torque(
                     part, rows, tick, self._believed(rows), joints, tape.position[going, tick]
                 )
             self.seen.balance[rows, tick] = balance
@@ -259,7 +256,7 @@ class Player:
 
     def tilt(self, part: int, rows: IntArray, length: IntArray) -> Array:
         """Largest angle between trunk and gait in a part of the stride [rad], shape (m,)."""
-        if self.balance is None:
+        if self._balance is None:
             return np.zeros(len(rows))
         pose = self.log.pose[rows, : int(length.max())]
-        return self.balance.tilt(part, rows, pose, length)
+        return self._balance.tilt(part, rows, pose, length)

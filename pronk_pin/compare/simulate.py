@@ -84,6 +84,7 @@ class Simulation:
             ticks=self.controller.max_ticks,
             rng=rng.spawn(1)[0],
             base=base,
+            balance=self.controller.balance,
             chunked=chunked,
         )
         self.world, self.upright = self.player.world, self.player.upright
@@ -155,8 +156,6 @@ class Simulation:
             record = controller.record(0, rows, log.phase(rows, stance, felt=late))
         strides.stance(rows, record, log, stance)
         tilt = player.tilt(0, rows, stance)
-        if player.balance is not None:
-            player.balance.lift_off(rows, controller.sideways(rows))
 
         # A touchdown is felt late: the last ticks of the flight's tape are the next stance's.
         flight = player.play(rows, tape, part=1) - late

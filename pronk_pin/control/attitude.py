@@ -26,7 +26,7 @@ class AttitudeRegulator:
     """
 
     stiffness: tuple[float, float, float] = (200.0, 200.0, 100.0)
-    damping: tuple[float, float, float] = (10.0, 10.0, 5.0)
+    damping: tuple[float, float, float] = (10.0, 30.0, 5.0)
     friction: float = 0.6
     until: float = 0.9
 

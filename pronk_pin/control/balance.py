@@ -2,7 +2,8 @@
 
 On the ground a moment on the trunk is spread over the contact forces within their friction cones,
 and the legs' transposed Jacobians turn what the forces change into torques. In the air the feet are
-moved, see `FootPlacement`. None of it is feedforward or tracking error, so none of it is learned.
+moved, see `FootPlacement`. None of it is feedforward or tracking error, so none of it is learned;
+and of the tracking errors in stance those that come from the trunk's attitude only in part.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from .._typing import Array, IntArray
 from ..conventions import rotation_matrix
+from ..errors import InvalidInput
 from ..gait import Gait
 from ..inverse_dynamics.distribution import distribute_wrench
 from ..kinematics.legs import contact_points, leg_geometry
@@ -31,10 +33,19 @@ class BalanceSpec:
     Attributes:
         attitude: On the ground.
         placement: In the air.
+        learned: Share of a deviation from the gait's attitude that the legs learn to undo in
+            stance. With all of it (1) learning, which sees the trunk a stride late, and this
+            regulation throw the trunk to and fro over tens of strides, the more the faster the
+            robot; with nothing of it (0) the trunk stays as far off as regulation leaves it.
     """
 
     attitude: AttitudeRegulator = field(default_factory=AttitudeRegulator)
     placement: FootPlacement = field(default_factory=FootPlacement)
+    learned: float = 0.4
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.learned <= 1.0:
+            raise InvalidInput("the share of the attitude that the legs learn lies in [0, 1]")
 
 
 class Balance:
@@ -108,6 +119,32 @@ class Balance:
             added = self._air(rows, tick, rotation, wanted, reference)
         added[~np.isfinite(added)] = 0.0  # a sensor that fails must not reach the motors
         return added
+
+    def unlearned(self, rows: IntArray, pose: Array, reference: Array) -> Array:
+        """What of the joints' errors in stance regulation keeps from the learning [rad].
+
+        That is, but for the share that is learned, what the joints are off because the trunk is
+        turned from the gait's attitude over feet that stand where they are.
+
+        Args:
+            rows: Which robots.
+            pose: What they believe of their trunks at each tick, shape (m, ticks, 7).
+            reference: The joints' references [rad], shape (m, ticks, 12).
+
+        Returns:
+            Shape (m, ticks, 12).
+        """
+        turn = np.swapaxes(rotation_matrix(pose[..., 3:7]), -1, -2)
+        turn = turn @ self._reference[rows, 0, : pose.shape[1]]
+        number = reference.shape[0] * reference.shape[1]
+        turned = placed(
+            self._geometry,
+            reference.reshape(number, -1, len(JOINTS)),
+            turn.reshape(number, 3, 3),
+            np.zeros((number, 3)),
+            np.ones(number),
+        ).reshape(reference.shape)
+        return np.asarray((1.0 - self._spec.learned) * (reference - turned))
 
     def tilt(self, part: int, rows: IntArray, pose: Array, length: IntArray) -> Array:
         """Largest angle between trunk and gait in a part of the stride [rad], shape (m,).

@@ -17,7 +17,7 @@ from ..errors import InvalidInput
 from ..gait import Gait
 from ..kinematics import rotate_leg
 from ..robot import NL, Robot
-from .balance import BalanceSpec
+from .balance import Balance, BalanceSpec
 from .contacts import ContactDetector
 from .estimation import SpeedEstimator
 from .feedforward import BASES
@@ -157,6 +157,7 @@ class Controller:
     Attributes:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
+        balance: What keeps a trunk up that may turn; None where it is locked.
         skipped: Why the robots' last strides are not worth learning from, index into `SKIPPED`,
             shape (n,).
     """
@@ -209,6 +210,16 @@ class Controller:
             self._laws[0] = spec.law.along([lifted_model(robot, gait, settings) for gait in gaits])
         self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
         self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
+        self.balance = None
+        if base != "locked":
+            self.balance = Balance(
+                robot,
+                gaits,
+                spec.balance,
+                gains=spec.gains,
+                ticks=self.max_ticks,
+                timestep=timestep,
+            )
         self._flown = self._flight.planned.copy()  # how long the last flights lasted
         if flight is not None:
             self._flight.stretch(np.arange(n), flight)
@@ -222,10 +233,6 @@ class Controller:
     def flight(self) -> Array:
         """How long the references of the robots' flights last [s], shape (n,)."""
         return self._flight.duration.copy()
-
-    def sideways(self, rows: IntArray) -> Array:
-        """Speeds to the left with which robots left the ground [m/s], shape (m,)."""
-        return self._estimator.sideways[rows]
 
     @property
     def max_ticks(self) -> int:
@@ -263,9 +270,11 @@ class Controller:
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
         """Flight tapes for robots that have just finished a stance, and the stance's record."""
         record = self.record(0, rows, log)
-        self._last[0].put(rows, record)
+        self._last[0].put(rows, self._learnable(record, rows, log))
         self._stood[rows] = self._judge_contact(log)
         speed = self._estimator.update(rows, log)
+        if self.balance is not None:
+            self.balance.lift_off(rows, self._estimator.sideways[rows])
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         reference = self._flight
         ticks = slice(int(_LATE_TOUCHDOWN * reference.ends(rows).max()))
@@ -349,6 +358,25 @@ class Controller:
             relative_duration=np.full(len(rows), np.nan),
             upright=np.ones(len(rows), dtype=bool),
             robot=rows,
+        )
+
+    def _learnable(self, record: StrideRecord, rows: IntArray, log: PhaseLog) -> StrideRecord:
+        """The record of a stance without what is the balance's to regulate."""
+        if self.balance is None or log.pose is None:
+            return record
+        reference, ticks = self._stance, log.joints.shape[1]
+        kept = self.balance.unlearned(rows, log.pose, reference.position[rows, :ticks])
+        rate = np.gradient(kept, self._timestep, axis=1)
+        index = log.index(phase_grid(), reference.duration[rows] / self._timestep)
+        kept, rate = resample(kept, index), resample(rate, index)
+        error, error_rate = record.error - kept, record.error_rate - rate
+        return replace(
+            record,
+            error=error,
+            error_rate=error_rate,
+            feedback=record.feedback - self.spec.gains.feedback(kept, rate),
+            error_onward=held(error),
+            rate_onward=held(error_rate),
         )
 
     def _learn(self, rows: IntArray) -> None:

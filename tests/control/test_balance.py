@@ -21,7 +21,7 @@ from pronk_pin.control.symmetry import mirrored, symmetric
 from pronk_pin.conventions import rotation_matrix
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import load_library
-from pronk_pin.kinematics import foot_positions
+from pronk_pin.kinematics import foot_positions, inverse_kinematics
 from pronk_pin.kinematics.contacts import contact_jacobian
 from pronk_pin.robot import Robot
 
@@ -103,6 +103,29 @@ def test_a_trunk_that_drifts_to_the_left_puts_its_feet_further_left(robot: Robot
     np.testing.assert_allclose(
         aside, np.tile([0.0, 0.3 * FootPlacement().gain, 0.0], (4, 1)), atol=1e-9
     )
+
+
+@pytest.mark.parametrize("learned", [0.0, 0.4, 1.0])
+def test_what_a_turned_trunk_does_to_the_legs_is_learned_in_part(
+    robot: Robot, learned: float
+) -> None:
+    """Feet that stand where the gait has them, under a trunk that is turned about its origin."""
+    straight, turned = in_stance(robot, 0.0, 0.0, 0.0), in_stance(robot, 0.02, -0.05, 0.03)
+    turned = inverse_kinematics(
+        robot, turned[:7], foot_positions(robot, straight), initial=straight, tolerance=1e-10
+    ).q
+    gait = load_library("a1", base="sagittal").at(0.3)
+    law = Balance(
+        robot, [gait], BalanceSpec(learned=learned), gains=Gains(), ticks=300, timestep=0.001
+    )
+    ticks = np.ones((1, TICK + 1, 1))
+    kept = law.unlearned(ROWS, ticks * turned[:7], ticks * straight[7:])[0, TICK]
+    np.testing.assert_allclose(kept, (1.0 - learned) * (straight - turned)[7:], atol=1e-9)
+
+
+def test_a_share_of_the_attitude_outside_0_to_1_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="share of the attitude"):
+        BalanceSpec(learned=1.1)
 
 
 def test_nothing_reaches_the_motors_where_the_attitude_is_not_a_number(robot: Robot) -> None:
