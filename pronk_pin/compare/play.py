@@ -16,6 +16,7 @@ from ..control import Balance, ControllerSpec, PhaseLog, Tape, clip_torque, phas
 from ..conventions import rotation_matrix
 from ..gait import Gait
 from ..robot import Robot
+from .inertial import InertialUnit, TrunkKnown
 from .motors import Motors
 from .record import TickLog
 from .scenario import Scenario
@@ -88,8 +89,14 @@ class Player:
         self.motors = Motors(scenario, robot.tau_max, n)
         self.sensors = SensorSuite(scenario.sensors, n, rng)
         self.log = self.seen = TickLog(n, ticks, turns=turns)
+        self._inertial = None
+        if balance is not None and spec.imu:
+            self._inertial = InertialUnit(
+                self.world, self.sensors, spec.attitude_filter, balance.at_touchdown
+            )
         if not self._servos and not self._ahead:
-            self.seen = TickLog(n, ticks, turns=turns)
+            inertial = self._inertial is not None
+            self.seen = TickLog(n, ticks, turns=turns, inertial=inertial)
         self._balance = balance
         self._late = spec.touchdown_ticks
         self._load = spec.contact.touchdown * robot.mass * robot.gravity
@@ -127,10 +134,13 @@ class Player:
                 motion = felt = world.play(who, self.motors.coming(who, stop - tick))
             else:
                 encoders = self.sensors.encoders(who, world.joints[who], world.joint_rates[who])
-                torque = self._torque(who, encoders, tape, going, tick, part)
+                trunk = self._believed(who)
+                torque = self._torque(who, encoders, trunk, tape, going, tick, part)
                 torque = self.motors.drive(who, torque, world.joint_rates[who])
                 motion = world.play(who, torque[:, None])
-                felt = self._felt(who, motion, encoders)
+                felt = self._felt(who, motion, encoders, trunk)
+                if trunk is not None and seen.inertial:
+                    seen.specific_force[who, tick] = trunk.specific_force
                 seen.write(who, tick, felt)
             log.write(who, tick, motion)
             played[going] = self._ends(who, felt, tick, tape.length[going], airborne)
@@ -169,6 +179,7 @@ class Player:
         self,
         rows: IntArray,
         encoders: tuple[Array, Array],
+        trunk: TrunkKnown | None,
         tape: Tape,
         going: IntArray,
         tick: int,
@@ -179,23 +190,35 @@ class Player:
         feedback = self._gains.feedback(
             tape.position[going, tick] - joints, tape.velocity[going, tick] - rates
         )
-        if self._balance is not None:
+        if self._balance is not None and trunk is not None:
             balance = np.zeros_like(feedback)
             if part is not None:
                 balance = self._balance.torque(
-                    part, rows, tick, self._believed(rows), joints, tape.position[going, tick]
+                    part, rows, tick, trunk[:2], joints, tape.position[going, tick]
                 )
             self.seen.balance[rows, tick] = balance
             feedback = feedback + balance
         return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
 
-    def _believed(self, rows: IntArray) -> tuple[Array, Array]:
-        """Pose (m, 7) and velocity (m, 6) of the trunk as the robots know them: the true ones."""
-        return self.world.pose[rows], self.world.twist[rows]
+    def _believed(self, rows: IntArray) -> TrunkKnown | None:
+        """What robots know of trunks that may turn: what the IMU says, or without one the truth."""
+        if self._balance is None:
+            return None
+        if self._inertial is not None:
+            return self._inertial.read(rows)
+        return TrunkKnown(self.world.pose[rows], self.world.twist[rows], np.zeros((len(rows), 3)))
 
-    def _felt(self, rows: IntArray, motion: Motion, encoders: tuple[Array, Array]) -> Motion:
+    def _felt(
+        self,
+        rows: IntArray,
+        motion: Motion,
+        encoders: tuple[Array, Array],
+        trunk: TrunkKnown | None,
+    ) -> Motion:
         """One tick's motion as the robots know it."""
         joints, rates = encoders
+        if trunk is not None:
+            motion = motion._replace(pose=trunk.pose[:, None], twist=trunk.twist[:, None])
         return motion._replace(
             joints=joints[:, None],
             joint_rates=rates[:, None],
@@ -235,7 +258,7 @@ class Player:
     def measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
         """What the robots measured in a part of the stride of so many ticks (m,)."""
         phase = self.seen.phase(rows, length, felt=felt)
-        if not self._imu:
+        if not self._imu or self._inertial is not None:
             return phase
         # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
         rate = self.log.base_rate[rows, : int(length.max()) + 1]

@@ -48,17 +48,21 @@ class TickLog:
         base, base_rate: Trunk x, z [m] and their rates [m/s], shape (n, size, 2).
         balance: Torques that keep the trunk up, see `control.balance` [N m], shape (n, size, 12).
         pose, twist: Trunk in Pinocchio's layout, shape (n, size, 7) and (n, size, 6).
+        specific_force: What the accelerometer says, trunk's axes [m/s^2], shape (n, size, 3).
         force: Ground's force on each foot, world frame [N], shape (n, size, 4, 3).
         turns: Whether the trunk can turn; else `pose`, `twist` and `balance` are of no use.
+        inertial: Whether an IMU is read at each tick; else `specific_force` is of no use.
     """
 
-    def __init__(self, n: int, size: int, *, turns: bool = True) -> None:
-        self.size, self.turns = size, turns
+    def __init__(self, n: int, size: int, *, turns: bool = True, inertial: bool = False) -> None:
+        self.size, self.turns, self.inertial = size, turns, inertial
         self._states = ["joints", "joint_rates", "base", "base_rate", "force"]
         self._torques = ["feedback", "feedforward", "missing"]
         if turns:
             self._states += ["pose", "twist"]
             self._torques += ["balance"]
+        self._readings = ["specific_force"] if inertial else []
+        self.specific_force = np.zeros((n, size, 3))
         self.joints, self.joint_rates = np.zeros((2, n, size, NL))
         self.feedback, self.feedforward, self.missing, self.balance = np.zeros((4, n, size, NL))
         self.base, self.base_rate = np.zeros((2, n, size, 2))
@@ -119,6 +123,7 @@ class TickLog:
             load=self.force[at][..., 2].sum(axis=-1),
             pose=self.pose[at] if self.turns else None,
             twist=self.twist[at] if self.turns else None,
+            specific_force=self.specific_force[at] if self.inertial else None,
         )
 
     def attitude(self, rows: IntArray, length: IntArray, index: Array) -> Array:
@@ -132,7 +137,7 @@ class TickLog:
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
         """So many ticks, from the ticks `start` (m,) on, are the first of the next phase."""
         kept = start[:, None] + np.arange(ticks)  # (m, ticks)
-        for name in (*self._states, *self._torques):
+        for name in (*self._states, *self._torques, *self._readings):
             channel = getattr(self, name)
             channel[rows, :ticks] = channel[rows[:, None], kept]
 

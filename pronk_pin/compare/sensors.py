@@ -106,5 +106,10 @@ class SensorSuite:
             specific_force + self.sensors.accelerometer_noise * accelerometer + bias[..., 3:],
         )
 
+    def at_rest(self, ticks: int, gravity: Array) -> tuple[Array, Array]:
+        """What all IMUs say, see `imu`, over ticks in which robots lie still, on the ground."""
+        still = np.zeros((len(self._streams), ticks, 3))
+        return self.imu(np.arange(len(still)), still, still - gravity)
+
     def _noise(self, rows: IntArray, shape: tuple[int, ...]) -> Array:
         return np.stack([self._streams[row].standard_normal(shape) for row in rows])

@@ -162,7 +162,7 @@ class Simulation:
         duration, upright = self._seconds(stance + flight), self.upright[rows]
         tilt = np.maximum(tilt, player.tilt(1, rows, flight))
         known = player.measured(rows, flight)
-        record = controller.landing(rows, known, duration, upright, tilt)
+        record = controller.landing(rows, known, duration, upright)
         if player.seen is not log:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)

@@ -4,6 +4,7 @@ from .attitude import AttitudeRegulator, attitude_angle, attitude_error, roll_pi
 from .balance import Balance, BalanceSpec
 from .contacts import ContactDetector, StanceContact
 from .controller import CONTROLLERS, Controller, ControllerSpec, load_controller
+from .estimation import AttitudeEstimator, AttitudeFilter
 from .feedforward import BASES, model_feedforward
 from .filters import ZeroPhaseFilter
 from .guided_strides import GuidedStrides, Settings
@@ -32,6 +33,8 @@ __all__ = [
     "PARTS",
     "SAMPLES",
     "SKIPPED",
+    "AttitudeEstimator",
+    "AttitudeFilter",
     "AttitudeRegulator",
     "Balance",
     "BalanceSpec",

@@ -19,7 +19,7 @@ from ..kinematics import rotate_leg
 from ..robot import NL, Robot
 from .balance import Balance, BalanceSpec
 from .contacts import ContactDetector
-from .estimation import SpeedEstimator
+from .estimation import AttitudeFilter, SpeedEstimator
 from .feedforward import BASES
 from .filters import ZeroPhaseFilter
 from .guided_strides import Settings
@@ -71,7 +71,9 @@ class ControllerSpec:
         selection: Strides worth learning from.
         contact: When a contact begins and ends, and which stances are none.
         speed_filter: Time constant of the speed estimate's filter [s].
-        imu: Whether an accelerometer on the trunk helps that estimate.
+        imu: Whether there is an IMU on the trunk: its accelerometer helps that estimate, and where
+            the trunk may turn it tells the attitude, which is known as it is otherwise.
+        attitude_filter: How it does.
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
             contact sensor is one late, and the contact began between two ticks.
     """
@@ -89,6 +91,7 @@ class ControllerSpec:
     contact: ContactDetector = field(default_factory=ContactDetector)
     speed_filter: float = 0.02
     imu: bool = False
+    attitude_filter: AttitudeFilter = field(default_factory=AttitudeFilter)
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
@@ -188,6 +191,7 @@ class Controller:
         self._timestep = timestep
         self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
         self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
+        self._tilt = np.zeros((n, len(PARTS)))
         self._stood = np.zeros(n, dtype=np.intp)  # why a stance was none, index into `SKIPPED`
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
@@ -198,10 +202,10 @@ class Controller:
             learning_filter = getattr(law, "filter", None)
             if isinstance(learning_filter, ZeroPhaseFilter):
                 learning_filter.warn()
-        if base != "locked" and (spec.imu or isinstance(spec.law, ModelBasedILC)):
+        if base != "locked" and isinstance(spec.law, ModelBasedILC):
             raise InvalidInput(
-                f"controller '{spec.name}' has an IMU or a law with a model that count on a level "
-                "trunk; use another controller, or base 'locked'"
+                f"controller '{spec.name}' has a law with a model that counts on a level trunk; "
+                "use another controller, or base 'locked'"
             )
         if isinstance(spec.law, ModelBasedILC):
             settings = Settings(
@@ -272,6 +276,7 @@ class Controller:
         record = self.record(0, rows, log)
         self._last[0].put(rows, self._learnable(record, rows, log))
         self._stood[rows] = self._judge_contact(log)
+        self._note_tilt(0, rows, log)
         speed = self._estimator.update(rows, log)
         if self.balance is not None:
             self.balance.lift_off(rows, self._estimator.sideways[rows])
@@ -292,7 +297,6 @@ class Controller:
         log: PhaseLog,
         duration: Array,
         upright: BoolArray | None = None,
-        tilt: Array | None = None,
     ) -> StrideRecord:
         """The end of a stride: the flight's record; whether the stride is worth learning from.
 
@@ -301,7 +305,6 @@ class Controller:
             log: What was measured in flight.
             duration: How long their strides lasted [s], shape (len(rows),).
             upright: Whether they have not fallen, shape (len(rows),); all by default.
-            tilt: Largest angle between trunk and gait [rad], shape (len(rows),); 0 by default.
         """
         record = self.record(1, rows, log)
         self._last[1].put(rows, record)
@@ -314,11 +317,16 @@ class Controller:
             last.upright[rows] = True if upright is None else upright
             reasons.append(self.spec.selection.skipped(last)[rows])
         reasons.append(self._stood[rows])
-        if tilt is not None:
-            far = tilt > self.spec.selection.tilt
-            reasons.append(np.where(far, SKIPPED.index("tilted"), 0))
+        self._note_tilt(1, rows, log)
+        far = self._tilt[rows].max(axis=1) > self.spec.selection.tilt
+        reasons.append(np.where(far, SKIPPED.index("tilted"), 0))
         self.skipped[rows] = np.select([reason > 0 for reason in reasons], reasons, default=0)
         return record
+
+    def _note_tilt(self, part: int, rows: IntArray, log: PhaseLog) -> None:
+        """How far the trunk was from the gait's attitude, as far as the robots know."""
+        if self.balance is not None and log.pose is not None:
+            self._tilt[rows, part] = self.balance.tilt(part, rows, log.pose, log.length)
 
     def _judge_contact(self, log: PhaseLog) -> IntArray:
         """Why stances were none, as indices into `SKIPPED`, shape (m,)."""
@@ -369,32 +377,28 @@ class Controller:
         rate = np.gradient(kept, self._timestep, axis=1)
         index = log.index(phase_grid(), reference.duration[rows] / self._timestep)
         kept, rate = resample(kept, index), resample(rate, index)
-        error, error_rate = record.error - kept, record.error_rate - rate
-        return replace(
-            record,
-            error=error,
-            error_rate=error_rate,
-            feedback=record.feedback - self.spec.gains.feedback(kept, rate),
-            error_onward=held(error),
-            rate_onward=held(error_rate),
-        )
+        return record.less(kept, rate, self.spec.gains.feedback(kept, rate))
 
     def _learn(self, rows: IntArray) -> None:
         """Update the feedforward of some robots from their last stride."""
-        if rows.size:
-            for part, law in enumerate(self._laws):
-                if law is not None:
-                    record = self._last[part].take(rows)
-                    told = given(record)
-                    if part == 1:
-                        # What the end of a flight does shows in the stance that follows it, which
-                        # is yet to come; it will be like the last one.
-                        ratio = self._flight.duration[rows] / self._stance.duration[rows]
-                        told = told.onward(self._last[0].take(rows), ratio)
-                    if self._base == "free":
-                        told = symmetric(self.robot, told)
-                    learned = law.update(told)
-                    self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
+        for part, law in enumerate(self._laws):
+            if law is not None and rows.size:
+                record = self._last[part].take(rows)
+                learned = law.update(self._told(part, rows, record))
+                self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
+
+    def _told(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
+        """What a law is told of the records of some robots' last strides."""
+        told = given(record)
+        if part == 1:
+            # What the end of a flight does shows in the stance that follows it, which is yet to
+            # come; it will be like the last one.
+            ratio = self._flight.duration[rows] / self._stance.duration[rows]
+            told = told.onward(self._last[0].take(rows), ratio)
+            if self.balance is not None:
+                share = self.spec.balance.landing
+                told = told.changed(lambda values: share * values)
+        return symmetric(self.robot, told) if self._base == "free" else told
 
     def _retime(self, rows: IntArray) -> None:
         """Let the next flights of some robots last as long as practice says."""

@@ -1,17 +1,21 @@
-"""What the controller believes about its speed: leg odometry and a first-order filter.
+"""What the controller believes of its speed and its attitude.
 
-In stance the feet do not slip, so the joint encoders tell the trunk's speed; in flight it stays as
-it was at lift-off. Section II.E of the paper. With an IMU the filter follows changes of the speed
-at once, and smooths the odometry's noise only.
+Speed: leg odometry and a first-order filter. In stance the feet do not slip, so the joint encoders
+tell the trunk's speed; in flight it stays as it was at lift-off. Section II.E of the paper. With an
+IMU the filter follows changes of the speed at once, and smooths the odometry's noise only.
+
+Attitude, where the trunk may turn: the gyro's integral, held upright by the accelerometer.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .._typing import Array, IntArray
+from ..conventions import rotation_matrix
 from ..errors import InvalidInput
 from ..kinematics import leg_odometry
 from ..robot import Robot
@@ -60,8 +64,10 @@ class SpeedEstimator:
             self._robot, q.reshape(n * ticks, -1), v.reshape(n * ticks, -1), contact="rolling"
         )
         forward = velocity[:, 0].reshape(n, ticks)
-        if log.specific_force is not None:  # gravity does not show in x: the base is level
-            forward = forward + self._time_constant * log.specific_force[:, :ticks, 0]
+        if log.specific_force is not None:  # gravity does not show in the world's x
+            along = rotation_matrix(pose[..., 3:])[..., 0, :]
+            felt = np.einsum("nti,nti->nt", along, log.specific_force[:, :ticks])
+            forward = forward + self._time_constant * felt
             sound &= np.isfinite(forward) | ~used
             forward = np.where(used, forward, 0.0)
         aside = velocity[:, 1].reshape(n, ticks)
@@ -75,6 +81,81 @@ class SpeedEstimator:
             latest = filtered[np.arange(n), log.length - 1]
             speeds[rows] = np.where(sound.all(axis=1), latest, speeds[rows])
         return self.speed[rows]
+
+
+@dataclass(frozen=True)
+class AttitudeFilter:
+    """The explicit complementary filter on SO(3) of Mahony, Hamel and Pflimlin (2008).
+
+    The accelerometer's vector is not normalised: in flight it tells nothing and weighs nothing,
+    and over a stride of steady pronking, which begins and ends at the same speed, its mean is the
+    vertical. Nothing holds the heading but a gyro whose bias was taken away at rest.
+
+    Before it stands up a robot lies still, its trunk level. What its IMU then says beyond gravity
+    is, in the mean, taken for the bias.
+
+    Attributes:
+        gain: At which a wrong attitude is righted [1/s].
+        rest: For how long it lies there [s].
+    """
+
+    gain: float = 0.1
+    rest: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.gain < np.inf and 0.0 < self.rest < np.inf):
+            raise InvalidInput("an attitude filter needs a gain >= 0 and a rest > 0")
+
+
+class AttitudeEstimator:
+    """The attitudes of n robots, tick by tick.
+
+    Args:
+        spec: The filter.
+        attitude: Attitudes to begin with, shape (n, 3, 3).
+        at_rest: Readings while the robots lie still and level: gyros [rad/s] and accelerometers
+            [m/s^2], each of shape (n, ticks, 3).
+        timestep: Time between two readings [s].
+        gravity: Acceleration of gravity [m/s^2].
+
+    Attributes:
+        quaternion: The estimates, xyzw, shape (n, 4).
+        rate: The angular velocities without the gyros' bias, trunk's axes [rad/s], shape (n, 3).
+    """
+
+    def __init__(
+        self,
+        spec: AttitudeFilter,
+        attitude: Array,
+        at_rest: tuple[Array, Array],
+        *,
+        timestep: float,
+        gravity: float,
+    ) -> None:
+        self._timestep, self._weight = timestep, spec.gain / gravity
+        turning, force = (readings.mean(axis=1) for readings in at_rest)
+        self._bias = turning, force - np.array([0.0, 0.0, gravity])
+        self.quaternion = Rotation.from_matrix(attitude).as_quat()
+        self.rate = np.zeros_like(turning)
+
+    def update(self, rows: IntArray, gyro: Array, specific_force: Array) -> None:
+        """Take in one reading of some robots' IMUs; one that is not finite changes nothing.
+
+        Args:
+            rows: Which robots.
+            gyro: Angular velocities, trunk's axes [rad/s], shape (m, 3).
+            specific_force: Accelerations less gravity, trunk's axes [m/s^2], shape (m, 3).
+        """
+        sound = np.isfinite(gyro.sum(axis=1) + specific_force.sum(axis=1))
+        rows = rows[sound]
+        rate, force = gyro[sound] - self._bias[0][rows], specific_force[sound] - self._bias[1][rows]
+        upward = rotation_matrix(self.quaternion[rows])[:, 2]  # the vertical in the trunk's axes
+        turn = 0.5 * (self.rate[rows] + rate) + self._weight * np.cross(force, upward)
+        self.rate[rows] = rate
+        if rows.size:
+            before = Rotation.from_quat(self.quaternion[rows])
+            after = before * Rotation.from_rotvec(self._timestep * turn)
+            self.quaternion[rows] = after.as_quat()
 
 
 _LEVEL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

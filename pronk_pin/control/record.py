@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -142,6 +143,32 @@ class StrideRecord:
             self,
             error_onward=resample(following.error, beyond),
             rate_onward=resample(following.error_rate, beyond),
+        )
+
+    def less(self, error: Array, error_rate: Array, feedback: Array) -> StrideRecord:
+        """The record without a part of its errors and their rates, and the feedback to that part.
+
+        Each has the shape (n, samples, 12).
+        """
+        error, error_rate = self.error - error, self.error_rate - error_rate
+        return replace(
+            self,
+            error=error,
+            error_rate=error_rate,
+            feedback=self.feedback - feedback,
+            error_onward=held(error),
+            rate_onward=held(error_rate),
+        )
+
+    def changed(self, change: Callable[[Array], Array]) -> StrideRecord:
+        """The record whose errors, their rates, and the feedback to them are changed alike."""
+        return replace(
+            self,
+            error=change(self.error),
+            error_rate=change(self.error_rate),
+            feedback=change(self.feedback),
+            error_onward=change(self.error_onward),
+            rate_onward=change(self.rate_onward),
         )
 
     def take(self, rows: IntArray) -> StrideRecord:

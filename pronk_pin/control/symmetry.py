@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -30,14 +29,7 @@ def symmetric(robot: Robot, record: StrideRecord) -> StrideRecord:
     def mean(values: Array) -> Array:
         return 0.5 * (values + mirrored(robot, values))
 
-    return replace(
-        record,
-        error=mean(record.error),
-        error_rate=mean(record.error_rate),
-        feedback=mean(record.feedback),
-        error_onward=mean(record.error_onward),
-        rate_onward=mean(record.rate_onward),
-    )
+    return record.changed(mean)
 
 
 @lru_cache(maxsize=16)

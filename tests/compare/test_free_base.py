@@ -8,7 +8,7 @@ import xarray as xr
 from pronk_pin.compare import Experiment, Schedule, World, build_model, load_scenario
 from pronk_pin.compare.experiment import run_cell
 from pronk_pin.compare.metrics import by_joint
-from pronk_pin.control import Balance
+from pronk_pin.control import AttitudeEstimator, Balance
 from pronk_pin.conventions import to_mujoco
 from pronk_pin.errors import UnknownName
 from pronk_pin.robot import Robot
@@ -85,6 +85,29 @@ def test_a_robot_whose_trunk_may_turn_stays_up_and_straight(base: str) -> None:
     assert np.abs(finished(strides, "tilt")).max() < 0.15
     assert np.degrees(np.abs(finished(strides, "heading")).max()) < 5.0
     assert strides["attitude"].sel(rotation="pitch").mean() == pytest.approx(-0.2, abs=0.05)
+
+
+def test_a_robot_that_only_has_an_imu_stays_up_and_straight() -> None:
+    strides = pronked("free", "ilc-imu", 2.0, 1.0, speeds=(0.4,), scenarios=("noise",))
+    assert finished(strides, "upright").min() == 1.0
+    assert np.abs(finished(strides, "tilt")).max() < 0.15
+    assert np.degrees(np.abs(finished(strides, "heading")).max()) < 5.0
+
+
+def test_a_robot_that_only_has_an_imu_does_not_see_its_true_attitude(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One that takes itself for turned to the left turns to the right."""
+    level = AttitudeEstimator.__init__
+
+    def turned(
+        self: AttitudeEstimator, spec: object, attitude: np.ndarray, *more: object, **rest: object
+    ) -> None:
+        level(self, spec, attitude @ pin.rpy.rpyToMatrix(0.0, 0.0, 0.1), *more, **rest)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(AttitudeEstimator, "__init__", turned)
+    strides = pronked("free", "ilc-imu", 1.5, 0.0, speeds=(0.4,), scenarios=("ideal",))
+    assert finished(strides, "heading").min() < -0.05
 
 
 def test_a_robot_that_is_thrown_over_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

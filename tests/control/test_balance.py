@@ -123,9 +123,10 @@ def test_what_a_turned_trunk_does_to_the_legs_is_learned_in_part(
     np.testing.assert_allclose(kept, (1.0 - learned) * (straight - turned)[7:], atol=1e-9)
 
 
-def test_a_share_of_the_attitude_outside_0_to_1_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="share of the attitude"):
-        BalanceSpec(learned=1.1)
+@pytest.mark.parametrize("wrong", [{"learned": 1.1}, {"landing": -0.1}])
+def test_a_share_that_is_learned_outside_0_to_1_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InvalidInput, match="shares"):
+        BalanceSpec(**wrong)
 
 
 def test_nothing_reaches_the_motors_where_the_attitude_is_not_a_number(robot: Robot) -> None:

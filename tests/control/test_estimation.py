@@ -8,8 +8,9 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin._typing import Array
-from pronk_pin.control import PhaseLog
+from pronk_pin.control import AttitudeEstimator, AttitudeFilter, PhaseLog, roll_pitch_yaw
 from pronk_pin.control.estimation import SpeedEstimator
+from pronk_pin.conventions import rotation_matrix
 from pronk_pin.errors import InvalidInput
 from pronk_pin.robot import Robot
 
@@ -135,3 +136,70 @@ def test_an_accelerometer_that_fails_leaves_the_estimate_as_it_was(
     estimator = SpeedEstimator(robot, 1, time_constant=0.05, timestep=DT)
     estimator.speed[0] = 0.25
     assert estimator.update(np.arange(1), log)[0] == 0.25
+
+
+ONE = np.array([0])
+UP = np.array([[0.0, 0.0, 9.81]])
+
+
+def attitudes(
+    spec: AttitudeFilter, bias: Array | float = 0.0, *, tilt: float = 0.0
+) -> AttitudeEstimator:
+    """One robot's estimator, which takes its trunk for level when it is rolled by `tilt`."""
+    still = np.zeros((1, 200, 3))
+    rest = still + bias, still + UP[0]
+    begin = pin.rpy.rpyToMatrix(tilt, 0.0, 0.0)[None]
+    return AttitudeEstimator(spec, begin, rest, timestep=DT, gravity=9.81)
+
+
+def test_a_turn_is_the_integral_of_its_rate() -> None:
+    estimator, rate = attitudes(AttitudeFilter(gain=0.0)), np.array([0.3, -2.0, 1.0])
+    estimator.update(ONE, rate[None], UP)  # the rate before it was zero
+    begin = rotation_matrix(estimator.quaternion)[0]
+    for _ in range(500):
+        estimator.update(ONE, rate[None], UP)
+    turned = begin @ pin.exp3(0.5 * rate)
+    np.testing.assert_allclose(rotation_matrix(estimator.quaternion)[0], turned, atol=1e-9)
+
+
+def test_gravity_rights_a_wrong_attitude_with_the_filters_time_constant() -> None:
+    estimator = attitudes(AttitudeFilter(gain=2.0), tilt=0.1)
+    for _ in range(500):
+        estimator.update(ONE, np.zeros((1, 3)), UP)
+    roll = roll_pitch_yaw(rotation_matrix(estimator.quaternion))[0, 0]
+    assert roll == pytest.approx(0.1 * np.exp(-1.0), rel=0.01)
+
+
+def test_flights_and_shakes_that_come_and_go_do_not_tilt_it() -> None:
+    """The mean over a stride counts: forward with 3 g on the legs, back with 1 g, and a flight."""
+    estimator, quarter = attitudes(AttitudeFilter(gain=0.1)), np.arange(10000) // 100 % 4
+    force = np.zeros((10000, 1, 3))
+    force[..., 0, 0] = np.choose(quarter, [6.0, -6.0, 0.0, 0.0])
+    force[..., 0, 2] = 9.81 * np.choose(quarter, [3.0, 1.0, 0.0, 0.0])
+    for reading in force:
+        estimator.update(ONE, np.zeros((1, 3)), reading)
+    np.testing.assert_allclose(rotation_matrix(estimator.quaternion)[0], np.eye(3), atol=5e-3)
+
+
+def test_what_a_gyro_says_at_rest_is_no_turn() -> None:
+    bias = np.array([0.01, -0.02, 0.03])
+    estimator = attitudes(AttitudeFilter(), bias)
+    for _ in range(1000):
+        estimator.update(ONE, bias[None], UP)
+    np.testing.assert_allclose(estimator.rate, 0.0, atol=1e-12)
+    np.testing.assert_allclose(rotation_matrix(estimator.quaternion)[0], np.eye(3), atol=1e-9)
+
+
+@pytest.mark.parametrize("broken", [0, 1])
+def test_a_reading_that_is_not_a_number_changes_nothing(broken: int) -> None:
+    estimator, readings = attitudes(AttitudeFilter(), tilt=0.1), [np.ones((1, 3)), UP.copy()]
+    before = estimator.quaternion.copy()
+    readings[broken][0, 1] = np.nan
+    estimator.update(ONE, *readings)
+    np.testing.assert_array_equal(estimator.quaternion, before)
+
+
+@pytest.mark.parametrize("wrong", [{"gain": -1.0}, {"gain": np.nan}, {"rest": 0.0}])
+def test_an_attitude_filter_that_makes_no_sense_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(InvalidInput, match="attitude filter"):
+        AttitudeFilter(**wrong)
