@@ -45,7 +45,7 @@ class BalanceSpec:
     attitude: AttitudeRegulator = field(default_factory=AttitudeRegulator)
     placement: FootPlacement = field(default_factory=FootPlacement)
     learned: float = 0.4
-    landing: float = 0.4
+    landing: float = 0.3
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.learned <= 1.0 and 0.0 <= self.landing <= 1.0):
