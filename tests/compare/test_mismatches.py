@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pronk_pin._typing import Array
-from pronk_pin.compare import Experiment, Schedule, Simulation, load_scenario
+from pronk_pin.compare import Experiment, Scenario, Schedule, Simulation, load_scenario
 from pronk_pin.compare.mismatch import MISMATCHES
 from pronk_pin.control import ControllerSpec, load_controller
 from pronk_pin.gait import load_library
@@ -18,16 +19,21 @@ LAST = 5
 
 
 def practise(
-    robot: Robot, controller: str | ControllerSpec, scenario: str, speeds: Sequence[float]
+    robot: Robot,
+    controller: str | ControllerSpec,
+    scenario: str | Scenario,
+    speeds: Sequence[float],
+    learning: float = 12.0,
 ) -> Simulation:
     """A practice that has been run."""
+    world = load_scenario(scenario) if isinstance(scenario, str) else scenario
     spec = load_controller(controller) if isinstance(controller, str) else controller
     simulation = Simulation(
         robot,
         [load_library("a1").at(speed) for speed in speeds],
         spec,
-        load_scenario(scenario),
-        schedule=Schedule(0.3, 5.0, 12.0),
+        world,
+        schedule=Schedule(0.3, 5.0, learning),
         rng=np.random.default_rng(0),
     )
     simulation.run()
@@ -69,3 +75,16 @@ def test_practice_takes_away_three_quarters_of_the_error_in_every_world(
     before, after = peaks(simulation)
     assert np.all(after < 0.25 * before)
     assert simulation.upright.all()
+
+
+@pytest.mark.slow
+def test_an_imu_and_odometry_do_nearly_as_well_as_true_states(robot: Robot) -> None:
+    """All of the noise but the encoders' zeros, which no robot can tell from its posture."""
+    noise = load_scenario("noise")
+    noise = replace(noise, sensors=replace(noise.sensors, encoder_bias=0.0))
+    speeds = load_library("a1").speeds
+    left = [
+        peaks(practise(robot, controller, scenario, speeds, learning=20.0))[1]
+        for controller, scenario in (("ilc-imu", noise), ("ilc", "nominal"))
+    ]
+    assert np.all(left[0] < 1.2 * left[1])
