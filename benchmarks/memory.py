@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PERIOD = 0.1  # [s]
-MISMATCH = ("-m", "pronk_pin.cli", "compare", "--suite", "mismatch", "--workers", "2", "--folder")
+MISMATCH = ("-m", "pronk_pin", "compare", "--suite", "mismatch", "--workers", "2", "--folder")
 
 
 def family(pid: int) -> Iterator[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from pathlib import Path
 
 import pandas as pd
@@ -34,6 +35,16 @@ def failure(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     assert last.startswith("pronk-pin: ")
     assert "Traceback" not in error
     return last
+
+
+def test_the_package_runs_as_a_module(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["pronk-pin", "gaits", "show", "--robot", "nobody"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("pronk_pin", run_name="__main__")
+    assert ended.value.code == 1
+    assert "unknown robot 'nobody'" in capsys.readouterr().err
 
 
 def test_compare_writes_everything_it_names(result: Path) -> None:
