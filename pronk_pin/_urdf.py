@@ -126,6 +126,25 @@ def _is_possible(inertia: pin.Inertia) -> bool:
     return bool(moments[0] > 1e-14 and moments[0] + moments[1] >= moments[2])
 
 
+def body_inertia(body: mujoco.MjsBody) -> pin.Inertia:
+    """The inertia of a body of `mujoco_spec`, in the body's frame."""
+    flat = np.zeros(9)
+    mujoco.mju_quat2Mat(flat, np.array(body.iquat))
+    axes = flat.reshape(3, 3)
+    return pin.Inertia(float(body.mass), np.array(body.ipos), axes @ np.diag(body.inertia) @ axes.T)
+
+
+def set_body_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
+    """Give a body of `mujoco_spec` another inertia, in the body's frame."""
+    principal, axes = np.linalg.eigh(inertia.inertia)
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, axes.ravel())
+    body.mass, body.ipos = inertia.mass, inertia.lever
+    body.inertia, body.iquat = principal, quaternion
+
+
 def link_inertia(link: ElementTree.Element) -> pin.Inertia | None:
     """A link's inertia in the link's frame."""
     inertial = link.find("inertial")

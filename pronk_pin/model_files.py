@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from ._urdf import link_inertia, mujoco_spec, set_link_inertia
+from ._urdf import link_inertia, mujoco_spec, set_body_inertia, set_link_inertia
 from .errors import cannot_write
 from .robot import Robot
 
@@ -21,14 +21,7 @@ _COULOMB_TIME = 0.002
 def mended_spec(robot: Robot) -> mujoco.MjSpec:
     """`mujoco_spec` with the robot's parameters, and a torque motor at every joint."""
     spec = mujoco_spec(robot)
-    trunk, body = spec.body(robot.spec.base_link), robot.model.inertias[1]
-    principal, axes = np.linalg.eigh(body.inertia)
-    if np.linalg.det(axes) < 0.0:
-        axes[:, 0] *= -1.0
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, axes.ravel())
-    trunk.mass, trunk.ipos = body.mass, body.lever
-    trunk.inertia, trunk.iquat = principal, quaternion
+    set_body_inertia(spec.body(robot.spec.base_link), robot.model.inertias[1])
     by_joint = zip(
         robot.joint_names,
         robot.model.armature[-robot.nu :],

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from .._urdf import body_inertia, set_body_inertia
 from .scenario import Scenario
 
 
@@ -21,17 +22,5 @@ def load_trunk(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
     trunk.ipos = np.array(trunk.ipos) + np.array(scenario.com_shift)
     if scenario.payload == 0.0:
         return
-    flat = np.zeros(9)
-    mujoco.mju_quat2Mat(flat, np.array(trunk.iquat))
-    rotation = flat.reshape(3, 3)
-    inertia = rotation @ np.diag(trunk.inertia) @ rotation.T
-    own = pin.Inertia(float(trunk.mass), np.array(trunk.ipos), inertia)
     point = pin.Inertia(scenario.payload, np.array(scenario.payload_position), np.zeros((3, 3)))
-    both = own + point
-    principal, axes = np.linalg.eigh(both.inertia)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] *= -1
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, axes.ravel())
-    trunk.mass, trunk.ipos = both.mass, both.lever
-    trunk.inertia, trunk.iquat = principal, quaternion
+    set_body_inertia(trunk, body_inertia(trunk) + point)
