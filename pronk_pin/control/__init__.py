@@ -3,7 +3,8 @@
 from .attitude import AttitudeRegulator, attitude_angle, attitude_error, roll_pitch_yaw
 from .balance import Balance, BalanceSpec
 from .contacts import ContactDetector, StanceContact
-from .controller import CONTROLLERS, Controller, ControllerSpec, load_controller
+from .controller import Controller
+from .controller_spec import CONTROLLERS, ControllerSpec, load_controller
 from .estimation import AttitudeEstimator, AttitudeFilter
 from .feedforward import BASES, model_feedforward
 from .filters import ZeroPhaseFilter

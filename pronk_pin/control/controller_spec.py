@@ -1,0 +1,119 @@
+"""What a controller is made of, and the controllers known by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from .._state import known_name
+from ..errors import InvalidInput
+from .balance import BalanceSpec
+from .contacts import ContactDetector
+from .estimation import AttitudeFilter
+from .filters import ZeroPhaseFilter
+from .learning import CurrentIterationILC, LearningLaw, PaperILC, PDTypeILC, StrideSelection
+from .model_based import NormOptimalILC
+from .reference import FlightTiming
+from .regulation import LegAngleRegulator
+from .tape import Gains
+
+SOURCES = ("none", "model", "library", "identified")
+"""Where a controller's first feedforward can come from."""
+
+
+@dataclass(frozen=True)
+class ControllerSpec:
+    """A controller of the comparison: where its feedforward comes from, and whether it learns.
+
+    Attributes:
+        name: Short name, as on the command line.
+        source: Where its feedforward comes from at first: "none", "model", "library", or
+            "identified", the model mended by what practice found.
+        mended_gaits: Play gaits that were optimised again with the mended model.
+        law: Learning law of the stance that is switched on later, if any.
+        flight_law: Learning law of the flight, likewise.
+        timing: How practice finds out how long a flight lasts; None plays it as planned. Without
+            a law, and where nobody tells how long, it does so from the first stride on.
+        gains: Feedback gains: eq. (9).
+        regulator: Speed regulation: eq. (12).
+        balance: Attitude and foot placement where the trunk is free to turn.
+        selection: Strides worth learning from.
+        contact: When a contact begins and ends, and which stances are none.
+        speed_filter: Time constant of the speed estimate's filter [s].
+        imu: Whether there is an IMU on the trunk: its accelerometer helps that estimate, and where
+            the trunk may turn it tells the attitude, which is known as it is otherwise.
+        attitude_filter: How it does.
+        touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
+            contact sensor is one late, and the contact began between two ticks.
+    """
+
+    name: str
+    source: str = "none"
+    mended_gaits: bool = False
+    law: LearningLaw | None = None
+    flight_law: LearningLaw | None = None
+    timing: FlightTiming | None = None
+    gains: Gains = field(default_factory=Gains)
+    regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
+    balance: BalanceSpec = field(default_factory=BalanceSpec)
+    selection: StrideSelection = field(default_factory=StrideSelection)
+    contact: ContactDetector = field(default_factory=ContactDetector)
+    speed_filter: float = 0.02
+    imu: bool = False
+    attitude_filter: AttitudeFilter = field(default_factory=AttitudeFilter)
+    touchdown_ticks: int = 2
+
+    def __post_init__(self) -> None:
+        known_name("source of feedforward", self.source, SOURCES)
+        if self.touchdown_ticks < 1:
+            raise InvalidInput("touchdown_ticks must be 1 or more: contacts are sensed a tick late")
+
+    @property
+    def laws(self) -> tuple[LearningLaw | None, ...]:
+        """The learning laws, in the order of `PARTS`."""
+        return self.law, self.flight_law
+
+
+FLIGHT_LAW = PDTypeILC(
+    gain=0.8,
+    leak=0.02,
+    delta=0.08,
+    # The error's rate would learn the vibration of the leg after lift-off.
+    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    filter=ZeroPhaseFilter.butterworth(3, 0.04),
+)
+"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
+
+_PRACTICE = ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming())
+"""Learning from nothing, over the whole stride."""
+
+CONTROLLERS = {
+    spec.name: spec
+    for spec in (
+        ControllerSpec("pd"),
+        _PRACTICE,
+        ControllerSpec("model", source="model"),
+        ControllerSpec("library", source="library", timing=FlightTiming()),
+        replace(_PRACTICE, name="model+ilc", source="model"),
+        replace(_PRACTICE, name="library+ilc", source="library"),
+        ControllerSpec("ilc-stance", law=PDTypeILC()),
+        ControllerSpec("ilc-paper", law=PaperILC()),
+        ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
+        ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        ControllerSpec("identified", source="identified"),
+        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
+        ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
+        replace(_PRACTICE, name="ilc-imu", imu=True),
+        ControllerSpec("model+timing", source="model", timing=FlightTiming()),
+        ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
+    )
+}
+"""Controllers known by name."""
+
+
+def load_controller(name: str) -> ControllerSpec:
+    """The controller of that name.
+
+    Raises:
+        UnknownName: There is none.
+    """
+    return CONTROLLERS[known_name("controller", name, CONTROLLERS)]
