@@ -14,14 +14,14 @@ from .world import World
 
 
 class TrunkKnown(NamedTuple):
-    """What m robots know of their trunks at one tick, or over some."""
+    """What m robots know of their trunks at one tick."""
 
     pose: Array
-    """Position and quaternion xyzw, shape (m, ..., 7); of the position nothing is known."""
+    """Position and quaternion xyzw, shape (m, 7); an IMU says nothing of the position: zero."""
     twist: Array
-    """Velocity in the trunk's own axes, shape (m, ..., 6); of the linear one nothing is known."""
+    """Velocity in the trunk's own axes, shape (m, 6); nor of the linear one."""
     specific_force: Array
-    """What the accelerometer says, trunk's axes [m/s^2], shape (m, ..., 3)."""
+    """What the accelerometer says, trunk's axes [m/s^2], shape (m, 3); zero without one."""
 
 
 class InertialUnit:
