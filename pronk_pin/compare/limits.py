@@ -35,6 +35,10 @@ def limitations(results: Results) -> list[str]:
 def _of_the_robot(results: Results) -> Iterator[str]:
     if results.experiment.base == "locked":
         yield "The trunk is locked to the sagittal plane without rotation, as in the paper."
+    else:
+        told = [name for name in results.experiment.controllers if not load_controller(name).imu]
+        if told:
+            yield f"Under {_listed(told)} the robots know the true attitude of their trunks."
     learners = [name for name in results.experiment.controllers if any(load_controller(name).laws)]
     stance_only = [name for name in learners if load_controller(name).flight_law is None]
     if stance_only:

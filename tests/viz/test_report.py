@@ -111,6 +111,10 @@ def test_limitations_are_those_of_this_run(result: Results, tmp_path: Path) -> N
     table.loc[pd_upright & (table["scenario"] == "payload"), "value"] = 0.0
     path.write_text(table.to_csv(index=False))
     assert "In payload under pd 2 robots fell (0, 0.4 m/s)" in "\n".join(limitations(copy))
+    free = replace(result.experiment, base="free", controllers=("pd", "ilc"))
+    text = "\n".join(limitations(replace(result, experiment=free)))
+    assert "Under pd and ilc the robots know the true attitude" in text
+    assert "trunk is locked" not in text
 
 
 def test_a_report_that_cannot_be_written_is_reported(result: Results, tmp_path: Path) -> None:
