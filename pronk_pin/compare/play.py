@@ -80,7 +80,7 @@ class Player:
         n, dt = len(gaits), scenario.timestep
         turns = balance is not None
         chunked = chunked and not turns
-        self._gains, self._tau_max, self._imu = spec.gains, robot.tau_max, spec.imu
+        self._gains, self._tau_max = spec.gains, robot.tau_max
         self._servos = chunked and scenario.affine
         # Ticks whose torques are known beforehand.
         self._ahead = scenario.delay_ticks if chunked and scenario.foreseeable else 0
@@ -89,7 +89,8 @@ class Player:
         self.motors = Motors(scenario, robot.tau_max, n)
         self.sensors = SensorSuite(scenario.sensors, n, rng)
         self.log = self.seen = TickLog(n, ticks, turns=turns)
-        self._inertial = None
+        self._level_imu = spec.imu and balance is None  # read a phase at a time
+        self._inertial = None  # read at each tick
         if balance is not None and spec.imu:
             self._inertial = InertialUnit(
                 self.world, self.sensors, spec.attitude_filter, balance.at_touchdown
@@ -258,7 +259,7 @@ class Player:
     def measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
         """What the robots measured in a part of the stride of so many ticks (m,)."""
         phase = self.seen.phase(rows, length, felt=felt)
-        if not self._imu or self._inertial is not None:
+        if not self._level_imu:
             return phase
         # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
         rate = self.log.base_rate[rows, : int(length.max()) + 1]

@@ -138,6 +138,22 @@ def test_an_accelerometer_that_fails_leaves_the_estimate_as_it_was(
     assert estimator.update(np.arange(1), log)[0] == 0.25
 
 
+def test_gravity_on_a_pitched_trunk_is_no_acceleration(
+    robot: Robot, rolling: Callable[..., PhaseLog]
+) -> None:
+    log, pitch = rolling(0.0), pin.rpy.rpyToMatrix(0.0, -0.2, 0.0)
+    ticks = np.ones((*log.joints.shape[:2], 1))
+    pose = np.concatenate([np.zeros(3), pin.Quaternion(pitch).coeffs()])
+    log = replace(
+        log,
+        pose=ticks * pose,
+        twist=ticks * np.zeros(6),
+        specific_force=ticks * (pitch.T @ np.array([0.0, 0.0, 9.81])),
+    )
+    estimator = SpeedEstimator(robot, 1, time_constant=0.05, timestep=DT)
+    assert estimator.update(np.arange(1), log)[0] == pytest.approx(0.0, abs=1e-9)
+
+
 ONE = np.array([0])
 UP = np.array([[0.0, 0.0, 9.81]])
 
