@@ -17,14 +17,13 @@ from .metrics import STEADY_STRIDES, settling_stride
 from .scenario import Scenario
 from .schedule import Schedule
 from .simulate import Simulation
-from .transfer import practise_library
+from .transfer import COMPARED, practise_library
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")
 """The same laws, from nothing, from the model's feedforward, and from the torque library."""
 SHOWN = (0, 1, 2, 5, 10)
 """Strides of learning in the table; 0 is the last one before."""
 _SCHEDULE = Schedule(0.5, 4.0, 16.0)
-_JOINTS = ("thigh", "calf")
 _WORDS = {"none": "nothing", "model": "the model", "library": "the library"}
 
 
@@ -80,7 +79,7 @@ def settling(table: pd.DataFrame) -> pd.DataFrame:
         for name, curve in curves.items():
             counts = [
                 settling_stride(curve[:, j], float(nothing[0, j]), float(final[j])) - 1.0
-                for j in range(len(_JOINTS))
+                for j in range(len(COMPARED))
             ]
             found.append({"controller": name, "speed": speed, "strides": float(np.max(counts))})
     return pd.DataFrame(found)
@@ -98,11 +97,11 @@ def describe_seeding(table: pd.DataFrame) -> str:
         mine, counts = table[table["controller"] == name], _of(strides, name)
         fell = int((~mine.groupby("speed")["upright"].all()).sum())
         took = _settled(counts) + (f", {fell} fell" if fell else "")
-        for joint in _JOINTS:
+        for joint in COMPARED:
             medians = mine.groupby("stride")[joint].median()
             values = " ".join(f"{medians[k]:9.4f}" for k in SHOWN)
             end = f"{medians.iloc[-STEADY_STRIDES:].median():9.4f}"
-            first = joint == _JOINTS[0]
+            first = joint == COMPARED[0]
             start = _WORDS[load_controller(name).source] if first else ""
             line = f"{start:<12}  {joint:<20}{values} {end}"
             lines.append(f"{line}   {took}" if first else line)
@@ -142,7 +141,7 @@ def _strides(spec: ControllerSpec, speeds: Sequence[float], done: Simulation) ->
                     "controller": spec.name,
                     "speed": speed,
                     "stride": np.arange(length),
-                    **{joint: legs[:, JOINTS.index(joint)] for joint in _JOINTS},
+                    **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
                     "upright": log.scalars["upright"][k, mine] == 1,
                 }
             )
@@ -153,7 +152,7 @@ def _strides(spec: ControllerSpec, speeds: Sequence[float], done: Simulation) ->
 def _curves(rows: pd.DataFrame, controller: str) -> Array:
     """Peaks of one robot by stride, (strides, 2)."""
     mine = rows[rows["controller"] == controller].sort_values("stride")
-    return np.asarray(mine[list(_JOINTS)].to_numpy(), dtype=float)
+    return np.asarray(mine[list(COMPARED)].to_numpy(), dtype=float)
 
 
 def _of(strides: pd.DataFrame, controller: str) -> Array:

@@ -22,6 +22,9 @@ from .strides import to_dataset
 
 TOLERANCE = 0.25
 """By how much a reused skill's error may exceed that where it was learned."""
+COMPARED = ("thigh", "calf")
+"""Joints whose errors are compared."""
+
 # At 0.8 m/s it takes 20 s until the touchdown stays at one tick.
 _PRACTICE = Schedule(0.5, 4.0, 28.0)
 _REPLAY = Schedule(0.5, 16.0, 0.0)  # the strides that count begin after the start
@@ -124,7 +127,9 @@ def describe_transfers(table: pd.DataFrame) -> str:
 
 def _in_words(table: pd.DataFrame) -> str:
     between = table[table["task"].str.startswith("left out")]
-    more = [between[joint].mean() / between[f"{joint}_practised"].mean() - 1.0 for joint in _JOINTS]
+    more = [
+        between[joint].mean() / between[f"{joint}_practised"].mean() - 1.0 for joint in COMPARED
+    ]
     wrong = table[~table["right"]]
     harmful, needless = int(wrong["reuse"].sum()), int((~wrong["reuse"]).sum())
     return (
@@ -135,12 +140,9 @@ def _in_words(table: pd.DataFrame) -> str:
     )
 
 
-_JOINTS = ("thigh", "calf")
-
-
 def _errors(simulation: Simulation, robot: int | None = None) -> Array:
     found = judged(simulation, robot)
-    return np.array([found[joint] for joint in _JOINTS], dtype=float)
+    return np.array([found[joint] for joint in COMPARED], dtype=float)
 
 
 def _rms(values: Array) -> float:

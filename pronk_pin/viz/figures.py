@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from .._typing import Array, IntArray
 from ..compare.metrics import by_joint, steady
 from ..compare.paper import table_1
+from ..compare.tables import SHOWN
 from .style import (
     ACCENT,
     DIVERGING,
@@ -31,7 +32,6 @@ from .style import (
 LABELS = {name: entry.label for name, entry in LOOKS.items()}
 """Controllers in words."""
 
-_JOINTS = ("calf", "thigh")
 _LEG = "FL"  # the leg that the paper shows
 
 
@@ -59,7 +59,7 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
     figure = new_figure(TWO_COLUMNS, 3.6)
     grid = figure.add_gridspec(2, 4, width_ratios=[2.1, 2.1, 1.2, 1.2])
     time: Axes | None = None
-    for row, joint in enumerate(_JOINTS):
+    for row, joint in enumerate(SHOWN):
         time = figure.add_subplot(grid[row, :2], sharex=time)
         _over_time(time, mine, f"{_LEG}_{joint}", shown, switch)
         if learning.size:
@@ -108,7 +108,7 @@ def torque_surface(strides: xr.Dataset) -> Figure:
     """The learned torque as a surface over speed and stance phase, by its contours."""
     torque = _learned(strides)
     figure = new_figure(TWO_COLUMNS, 2.6)
-    for axes, joint in zip(figure.subplots(1, 2), _JOINTS, strict=True):
+    for axes, joint in zip(figure.subplots(1, 2), SHOWN, strict=True):
         surface = torque.sel(joint=f"{_LEG}_{joint}").transpose("speed", "phase")
         x, y, z = (a.to_numpy() for a in (strides["phase"], strides["speed"], surface))
         if len(y) < 2:  # one speed is no surface: a stripe
@@ -153,7 +153,7 @@ def _by_speed(torque: xr.DataArray, phase: Array, label: str) -> Figure:
     figure = new_figure(TWO_COLUMNS, 2.6)
     panels = figure.subplots(1, 2)
     colors = colormaps[SEQUENTIAL](np.linspace(0.0, 0.92, len(speeds)))
-    for axes, joint in zip(panels, _JOINTS, strict=True):
+    for axes, joint in zip(panels, SHOWN, strict=True):
         for k in range(len(speeds)):
             curve = torque.isel(speed=k).sel(joint=f"{_LEG}_{joint}")
             axes.plot(phase, curve, color=colors[k], label=f"{speeds[k]:g}")
@@ -174,7 +174,7 @@ def errors_by_speed(summary: pd.DataFrame, *, scenario: str) -> Figure:
     rows = summary[(summary["metric"] == "peak_error") & (summary["scenario"] == scenario)]
     figure = new_figure(TWO_COLUMNS, 2.9)
     panels = figure.subplots(1, 2)
-    for axes, joint in zip(panels, _JOINTS, strict=True):
+    for axes, joint in zip(panels, SHOWN, strict=True):
         printed = table_1()
         for controller, marker in (("pd", "x"), ("ilc", "+")):
             paper = printed[(printed["joint"] == joint) & (printed["controller"] == controller)]
@@ -204,7 +204,7 @@ def learning_curves(strides: Mapping[str, xr.Dataset]) -> Figure:
     """
     figure = new_figure(TWO_COLUMNS, 2.7)
     panels = figure.subplots(1, 2)
-    for axes, joint in zip(panels, _JOINTS, strict=True):
+    for axes, joint in zip(panels, SHOWN, strict=True):
         for controller in in_order(strides):
             curves, style = _learning(strides[controller], joint), look(controller)
             if curves is None:
