@@ -1,0 +1,338 @@
+"""Files, written whole or not at all, and read with one error for every way of being damaged.
+
+Whatever the package writes goes through `write_file`, and whatever it reads through the readers
+here. A file appears under its name only when it is whole and on the disk; until then it is a
+neighbour that ends in `.partial` and bears the number of the process that writes it.
+
+The readers are around calls of libraries only, so that what they turn into a `FileProblem` is never
+a fault of this package. What the contents mean is checked by `as_type`, or by who asked for them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import hashlib
+import io
+import itertools
+import json
+import math
+import os
+import re
+import stat
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from .errors import FileProblem, PronkError, cannot_write
+
+LARGEST_FILE = 2**30
+"""Size beyond which no file of ours is read [bytes]; a comparison makes some of 3 % of it."""
+
+LARGEST_ARRAYS = 2**28
+"""Size beyond which the arrays of an `.npz` are not unpacked [bytes]."""
+
+_PARTIAL = re.compile(r"\..+\.(\d+)-\d+\.partial")
+_counter = itertools.count()
+
+_T = TypeVar("_T")
+
+
+def write_file(
+    path: Path | str,
+    contents: bytes | str,
+    *,
+    remedy: str = "choose another place, or make room",
+) -> Path:
+    """Write a file whole or not at all; what was there before stays until the new one is complete.
+
+    Args:
+        path: The file; folders on the way are made. What a link names is written, not the link,
+            and what is no regular file (`/dev/stdout`, a pipe) is written to as it stands.
+        contents: Text, stored as UTF-8, or bytes.
+        remedy: What to do where it cannot be written.
+
+    Returns:
+        The path.
+
+    Raises:
+        FileProblem: It cannot be written.
+    """
+    path = Path(path)
+    data = contents.encode() if isinstance(contents, str) else contents
+    try:
+        target = Path(os.path.realpath(path))
+        if target.exists() and not target.is_file() and not target.is_dir():
+            with target.open("wb") as stream:
+                stream.write(data)
+            return path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _replace(target, data)
+    except (OSError, ValueError) as error:
+        raise cannot_write(path, error, remedy) from error
+    return path
+
+
+def _replace(target: Path, data: bytes) -> None:
+    partial = target.with_name(f".{target.name}.{os.getpid()}-{next(_counter)}.partial")
+    try:
+        with partial.open("xb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())  # a name must not outlive a power cut without its contents
+        partial.replace(target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            partial.unlink()
+        raise
+
+
+def clear_partial_files(folder: Path) -> None:
+    """Remove what killed processes have left half written in a folder and the folders in it.
+
+    Raises:
+        FileProblem: One cannot be removed.
+    """
+    for partial in [*folder.glob("*.partial"), *folder.glob("*/*.partial")]:
+        writer = _PARTIAL.fullmatch(partial.name)
+        if writer is not None and _is_running(int(writer[1])):
+            continue
+        try:
+            partial.unlink(missing_ok=True)
+        except OSError as error:
+            raise FileProblem(
+                partial,
+                f"cannot be removed ({error.strerror})",
+                "make the folder writable, or choose another one",
+            ) from error
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+@contextlib.contextmanager
+def reading(path: Path | str, remedy: str, *, what: str = "") -> Iterator[None]:
+    """Around calls of a library that reads a file: whatever goes wrong there, the file is damaged.
+
+    Only such calls belong inside, and none of this package's own code, whose faults must be seen.
+
+    Args:
+        path: The file, as the error names it.
+        remedy: What to do about it.
+        what: What the file should be, as in "gait library".
+
+    Raises:
+        FileProblem: The library has failed.
+    """
+    try:
+        yield
+    except PronkError:
+        raise
+    except (Exception, MemoryError, RecursionError) as error:
+        raise damaged(path, error, remedy, what=what) from error
+
+
+def damaged(
+    path: Path | str, reason: Exception | str, remedy: str, *, what: str = ""
+) -> FileProblem:
+    """The `FileProblem` of a file whose contents are not what they should be."""
+    text = " ".join(str(reason).split()) or type(reason).__name__
+    text = text if len(text) <= 200 else f"{text[:197]}..."
+    return FileProblem(path, f"damaged{f' {what}' if what else ''} ({text})", remedy)
+
+
+def read_bytes(path: Path | str, remedy: str, *, limit: int = LARGEST_FILE) -> bytes:
+    """Read a regular file.
+
+    Args:
+        path: The file.
+        remedy: What to do where it is missing or too large.
+        limit: Largest size [bytes].
+
+    Raises:
+        FileProblem: It is missing, no regular file, too large, or the system cannot read it.
+    """
+    path = Path(path)
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise FileProblem(path, "is not a file", remedy)
+        if status.st_size > limit:
+            raise FileProblem(path, f"is too large ({status.st_size / 1e6:.0f} MB)", remedy)
+        return path.read_bytes()
+    except FileNotFoundError as error:
+        raise FileProblem(path, "missing", remedy) from error
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FileProblem(path, f"cannot be read ({reason})", remedy) from error
+
+
+def read_text(path: Path | str, remedy: str, *, limit: int = LARGEST_FILE) -> str:
+    """Read a file of UTF-8 text.
+
+    Raises:
+        FileProblem: It cannot be read, or is no text.
+    """
+    data = read_bytes(path, remedy, limit=limit)
+    with reading(path, remedy):
+        return data.decode()
+
+
+def read_json(path: Path | str, remedy: str) -> Any:
+    """Read a JSON document.
+
+    Raises:
+        FileProblem: It cannot be read, or is no JSON.
+    """
+    text = read_text(path, remedy)
+    with reading(path, remedy):
+        return json.loads(text)
+
+
+def read_xml(path: Path | str, remedy: str, *, what: str = "") -> ElementTree.Element:
+    """Read an XML document; the root of its tree.
+
+    Raises:
+        FileProblem: It cannot be read, or is no XML.
+    """
+    data = read_bytes(path, remedy)
+    with reading(path, remedy, what=what):
+        return ElementTree.fromstring(data)
+
+
+def read_arrays(
+    path: Path | str, remedy: str, *, what: str = "", limit: int = LARGEST_ARRAYS
+) -> dict[str, npt.NDArray[Any]]:
+    """Read the arrays of an `.npz`, after a look at how large they say they are.
+
+    Args:
+        path: The file.
+        remedy: What to do where it cannot be read.
+        what: What the file should be.
+        limit: Largest size of all arrays together [bytes].
+
+    Raises:
+        FileProblem: It is missing, damaged or too large, or holds objects, which are never read.
+    """
+    data = read_bytes(path, remedy)
+    with reading(path, remedy, what=what), zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = archive.infolist()
+        if sum(member.file_size for member in members) > limit:
+            raise ValueError(f"more than {limit / 1e6:.0f} MB when unpacked")
+        return {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> npt.NDArray[Any]:
+    """An array of an archive, whose header must not promise more than there is."""
+    stream = io.BytesIO(archive.read(member))
+    version = np.lib.format.read_magic(stream)
+    if version == (1, 0):
+        shape, _, dtype = np.lib.format.read_array_header_1_0(stream)
+    else:
+        shape, _, dtype = np.lib.format.read_array_header_2_0(stream)
+    if math.prod(shape) * dtype.itemsize != member.file_size - stream.tell():
+        raise ValueError(f"{member.filename} is not of the size that it says")
+    stream.seek(0)
+    return np.lib.format.read_array(stream, allow_pickle=False)
+
+
+def write_arrays(
+    path: Path | str,
+    arrays: Mapping[str, npt.ArrayLike],
+    *,
+    remedy: str = "choose another place, or make room",
+) -> Path:
+    """Write an `.npz`, whole or not at all.
+
+    Raises:
+        FileProblem: It cannot be written.
+    """
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    return write_file(path, stream.getvalue(), remedy=remedy)
+
+
+def read_csv(path: Path | str, remedy: str) -> list[list[str]]:
+    """Read the rows of a CSV file as text, the heading first.
+
+    Raises:
+        FileProblem: It cannot be read, is empty, or its rows are not of one length.
+    """
+    text = read_text(path, remedy)
+    with reading(path, remedy):
+        rows = list(csv.reader(io.StringIO(text), strict=True))
+    if not rows or {len(row) for row in rows} != {len(rows[0])}:
+        raise damaged(path, "rows of different lengths" if rows else "empty", remedy)
+    return rows
+
+
+def as_type(document: object, kind: type[_T], path: Path | str, remedy: str) -> _T:
+    """What a JSON document says, as a dataclass or another type.
+
+    Args:
+        document: Lists, dictionaries, strings, numbers, as `read_json` gives them.
+        kind: The type; unknown fields of a dataclass are refused.
+        path: Where the document comes from, for the error.
+        remedy: What to do where it is something else.
+
+    Raises:
+        FileProblem: It is something else.
+        PronkError: What the dataclass itself raises for values that are out of range.
+    """
+    try:
+        unknown_fields(document, kind)
+        return msgspec.convert(document, kind)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise damaged(path, error, remedy) from error
+
+
+def unknown_fields(document: object, kind: type[Any]) -> None:
+    """Refuse fields that a dataclass does not have, at its first level."""
+    fields = getattr(kind, "__dataclass_fields__", None)
+    if fields is not None and isinstance(document, dict):
+        strangers = [str(name) for name in document if name not in fields]
+        if strangers:
+            raise msgspec.ValidationError(f"unknown field {', '.join(strangers)}")
+
+
+def sha256(data: bytes | str) -> str:
+    """SHA-256 of bytes, or of text as UTF-8, in hexadecimal digits."""
+    return hashlib.sha256(data.encode() if isinstance(data, str) else data).hexdigest()
+
+
+def sealed(document: Mapping[str, Any]) -> str:
+    """A JSON document as text, with the SHA-256 of what it says in its last field, `sha256`."""
+    body = {key: value for key, value in document.items() if key != "sha256"}
+    return json.dumps({**body, "sha256": sha256(_canonical(body))}, indent=2) + "\n"
+
+
+def read_sealed(path: Path | str, remedy: str) -> dict[str, Any]:
+    """Read a JSON document that `sealed` made, without its seal.
+
+    Raises:
+        FileProblem: It cannot be read, or says something else than when it was sealed.
+    """
+    document = read_json(path, remedy)
+    if not isinstance(document, dict) or "sha256" not in document:
+        raise damaged(path, "it has no 'sha256'", remedy)
+    seal = document.pop("sha256")
+    if seal != sha256(_canonical(document)):
+        raise damaged(path, "it was changed after it was written", remedy)
+    return document
+
+
+def _canonical(document: object) -> str:
+    return json.dumps(document, sort_keys=True, separators=(",", ":"))
