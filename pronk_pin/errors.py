@@ -217,6 +217,22 @@ class PortUnavailable(PronkError):
         )
 
 
+class OtherMachine(UserWarning):
+    """A result that is completed on another machine than it was begun on: last bits may differ.
+
+    Attributes:
+        folder: The results folder.
+        differences: What differs.
+    """
+
+    def __init__(self, folder: Path, differences: str) -> None:
+        self.folder, self.differences = folder, differences
+        super().__init__(
+            f"{folder} was begun elsewhere ({differences}): the last bits of what is simulated "
+            "now may differ from those of a run in one place"
+        )
+
+
 class LeakyFilter(UserWarning):
     """A learning filter whose DC gain is not 1: it loses, or adds, torque in each stride."""
 

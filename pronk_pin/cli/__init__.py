@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import sys
 import warnings
+from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, Protocol, TextIO, Union
 
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, subcommand
 
 from .._state import known_name
+from ..compare import Results
 from ..compare.suites import SUITES, load_suite
-from ..errors import LeakyFilter, PronkError
+from ..errors import LeakyFilter, OtherMachine, PronkError
 from .comparison import Compare, Explain, Report, Reproduce
 from .gaits import Gaits
 from .ilc import Ilc
@@ -27,12 +30,17 @@ class _Runs(Protocol):
 
 
 def _commands(arguments: list[str]) -> Any:
-    """All commands; the defaults of `compare` are those of the suite that is asked for."""
+    """All commands; the defaults of `compare` are those of the suite that is asked for, or what is
+    in the results folder that it is to go on with."""
     words = [word for argument in arguments for word in argument.split("=", 1)]
     following = dict(pairwise(words))
     suite = following.get("--suite", "default")
     known_name("suite", suite, SUITES)
-    default = Compare(experiment=load_suite(suite), suite=suite)
+    experiment = load_suite(suite)
+    folder = Path(following.get("--folder", ""))
+    if words[:1] == ["compare"] and "--suite" not in words and (folder / "config.json").is_file():
+        experiment = replace(Results.load(folder).experiment, batches=())
+    default = Compare(experiment=experiment, suite=suite)
     return Union[  # noqa: UP007 -- its first member is made here
         Annotated[Compare, subcommand("compare", default=default)], Command
     ]
@@ -61,7 +69,8 @@ def main(arguments: list[str] | None = None) -> int:
             config=(OmitSubcommandPrefixes,),
         )
         with warnings.catch_warnings():
-            warnings.simplefilter("once", LeakyFilter)
+            for category in (LeakyFilter, OtherMachine):
+                warnings.simplefilter("once", category)
             warnings.showwarning = _show_warning
             return command.run() or 0
     except PronkError as error:

@@ -10,7 +10,15 @@ from typing import Annotated
 import numpy as np
 from tyro.conf import Positional, arg
 
-from ..compare import Experiment, Results, default_folder, describe, explain, run_experiment
+from ..compare import (
+    Experiment,
+    Results,
+    default_folder,
+    describe,
+    explain,
+    mjcf_parity,
+    run_experiment,
+)
 from ..compare.changes import format_changes
 from ..compare.closing import close_loop, format_loop
 from ..compare.reproduce import format_reproduction
@@ -18,6 +26,7 @@ from ..compare.suites import load_suite
 from ..compare.words import families, format_suite, format_tables
 from ..errors import InvalidInput
 from ..model_files import write_mjcf, write_urdf
+from ..robot import load_robot
 from ..viz import write_replay
 from ..viz.explanation_figure import write_explanation_figure
 from ..viz.practice import practice_programme
@@ -28,7 +37,8 @@ from ..viz.report import write_figures, write_report
 class Compare:
     """Run the comparison: simulate, print the table, write report and replay.
 
-    Run it again with the same --folder and it completes what is missing.
+    Run it again with the same --folder alone and it goes on where it was; with more controllers,
+    scenarios, speeds or seeds it adds them to what is there.
     """
 
     experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
@@ -42,18 +52,23 @@ class Compare:
     """Processes; by default one for each core."""
     executor: str | None = None
     """Who simulates instead of these processes: dask://HOST:PORT of a dask scheduler."""
+    resimulate: bool = False
+    """Simulate again what the folder has damaged, or of something else, instead of refusing it."""
 
     def run(self) -> None:
         """Do it."""
         name = "comparison" if self.suite == "default" else self.suite
-        folder = self.folder or default_folder(name)
-        foreign = Results.create(self.experiment, folder).foreign
-        if foreign is not None:
-            print(foreign.parity.table())
+        folder, world = self.folder or default_folder(name), self.experiment.world
+        if world:
+            print(mjcf_parity(load_robot(self.experiment.robot), world).table())
         results = run_experiment(
-            self.experiment, folder, workers=self.workers, executor=self.executor
+            self.experiment,
+            folder,
+            workers=self.workers,
+            executor=self.executor,
+            resimulate=self.resimulate,
         )
-        print(f"robot {self.experiment.robot}, base {self.experiment.base}\n")
+        print(f"robot {results.experiment.robot}, base {results.experiment.base}\n")
         _print_tables(results)
         _write_pages(results)
 
@@ -147,7 +162,8 @@ class Explain:
             raise InvalidInput(f"seed={self.seed}; give a number from 0 on")
         results = Results.load(self.result)
         cell = results.find(controller=self.controller, scenario=self.scenario)
-        strides, rng = results.strides(cell), np.random.default_rng(self.seed)
+        strides = results.all_strides(controller=self.controller, scenario=self.scenario)
+        rng = np.random.default_rng(self.seed)
         found = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
         print(f"{cell.controller} in scenario {cell.scenario}\n\n{describe(found)}")
         if self.figure is not None:

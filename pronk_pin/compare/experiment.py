@@ -7,12 +7,14 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
+from tyro.conf import Suppress
 
 from .._state import known_name
 from ..control import BASES, ControllerSpec, Skill, TorqueLibrary, load_controller, phase_grid
@@ -20,8 +22,8 @@ from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
 from ..gait import SPEEDS, Gait, GaitLibrary, load_library
 from ..robot import Robot, load_robot
+from .definition import cell_definition, define, fingerprint, to_text
 from .explanation import explain, mended_gaits
-from .foreign import mjcf_sha256
 from .metrics import steady
 from .scenario import load_scenario
 from .schedule import Schedule
@@ -53,6 +55,8 @@ class Experiment:
             simulation; see `compare.foreign`. The scenarios add to what is in it: "ideal" takes it
             as it is. The file is read when the experiment is run, and not before.
         schedule: What happens when.
+        batches: Speeds that are simulated together, in the order in which they were added to a
+            results folder; empty for all at once.
     """
 
     robot: str = "a1"
@@ -63,6 +67,7 @@ class Experiment:
     base: str = "locked"
     world: str = ""
     schedule: Schedule = field(default_factory=Schedule)
+    batches: Annotated[tuple[tuple[float, ...], ...], Suppress] = ()
 
     def __post_init__(self) -> None:
         load_robot(self.robot)
@@ -88,6 +93,41 @@ class Experiment:
         if self.world:
             object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
         object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
+        self._sort_batches()
+
+    def _sort_batches(self) -> None:
+        batches = tuple(tuple(sorted(batch)) for batch in self.batches)
+        together = tuple(sorted(speed for batch in batches for speed in batch))
+        if batches and (together != self.speeds or not all(batches)):
+            raise InvalidInput("batches must hold each speed once, and none of them may be empty")
+        object.__setattr__(self, "batches", batches if len(batches) > 1 else ())
+
+    def gait(self, speed: float) -> Gait:
+        """The gait of a speed [m/s]."""
+        return _gaits(self.robot, self.base).at(speed)
+
+    def extended(self, other: Experiment) -> Experiment:
+        """This experiment with the controllers, scenarios, speeds and seeds of another one, too.
+
+        What is here stays as it is: speeds that come in are simulated by themselves.
+
+        Raises:
+            InvalidInput: The other one is otherwise in something that cannot be added to.
+        """
+        against = [
+            f"{name} is {mine!r} there, and {theirs!r} here"
+            for name, mine, theirs in _fixed(self, other)
+            if mine != theirs
+        ]
+        if against:
+            raise InvalidInput("; ".join(against))
+        more: dict[str, Any] = {
+            name: tuple(dict.fromkeys((*getattr(self, name), *getattr(other, name))))
+            for name in ("controllers", "scenarios", "seeds", "speeds")
+        }
+        added = tuple(speed for speed in other.speeds if speed not in self.speeds)
+        batches = (*(self.batches or (self.speeds,)), added) if added else self.batches
+        return dataclasses.replace(self, **more, batches=batches)
 
     def cells(self) -> tuple[Cell, ...]:
         """The simulations, in an order in which each finds what it depends on done before it."""
@@ -99,23 +139,37 @@ class Experiment:
         return tuple(
             Cell(
                 self.robot,
-                self.speeds,
+                speeds,
                 controller,
                 scenario,
                 seed,
                 self.base,
                 self.world,
                 self.schedule,
+                batch,
             )
+            for batch, speeds in enumerate(self.batches or (self.speeds,))
             for controller in controllers
             for scenario in self.scenarios
             for seed in self.seeds
         )
 
 
+def _fixed(one: Experiment, other: Experiment) -> Iterator[tuple[str, object, object]]:
+    """What cannot be added to: name, and its value in either of two experiments."""
+    for name in ("robot", "base", "world"):
+        yield name, getattr(one, name), getattr(other, name)
+    for part in dataclasses.fields(Schedule):
+        name = part.name
+        yield f"schedule.{name}", getattr(one.schedule, name), getattr(other.schedule, name)
+
+
 @dataclass(frozen=True)
 class Cell:
-    """One simulation of an experiment; see `Experiment` for the attributes."""
+    """One simulation of an experiment; see `Experiment` for the attributes.
+
+    Its `speeds` are those of one batch.
+    """
 
     robot: str
     speeds: tuple[float, ...]
@@ -125,11 +179,27 @@ class Cell:
     base: str
     world: str
     schedule: Schedule
+    batch: int = 0
 
     @property
     def name(self) -> str:
         """Name of the cell's file."""
-        return f"{self.controller}_{self.scenario}_{self.seed}"
+        later = f".{self.batch + 1}" if self.batch else ""
+        return f"{self.controller}_{self.scenario}_{self.seed}{later}"
+
+    @property
+    def experiment(self) -> Experiment:
+        """The experiment of this cell alone, and of the one that it depends on."""
+        return Experiment(
+            robot=self.robot,
+            speeds=self.speeds,
+            controllers=(self.controller,),
+            scenarios=(self.scenario,),
+            seeds=(self.seed,),
+            base=self.base,
+            world=self.world,
+            schedule=self.schedule,
+        )
 
     @property
     def practised(self) -> Cell | None:
@@ -224,6 +294,7 @@ def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
 
 def _attributes(cell: Cell) -> dict[str, str | int | float]:
     scenario = load_scenario(cell.scenario, mjcf=cell.world)
+    definition = cell_definition(define(cell.experiment), cell)
     return {
         "robot": cell.robot,
         "base": cell.base,
@@ -232,7 +303,9 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "seed": cell.seed,
         "scenario_parameters": scenario.to_json(),
         "world": cell.world,
-        "world_sha256": mjcf_sha256(cell.world) if cell.world else "",
+        "world_sha256": definition["mjcf_sha256"],
         "timestep": scenario.timestep,
         "switch": cell.schedule.practice,
+        "definition": to_text(definition),
+        "fingerprint": fingerprint(definition),
     }

@@ -108,8 +108,8 @@ def rows_of_beating(practised: list[Practice]) -> Iterator[dict[str, object]]:
                 }
 
 
-def _place(one: Practice) -> tuple[object, object]:
-    return one.settings["scenario"], one.settings["seed"]
+def _place(one: Practice) -> tuple[object, ...]:
+    return one.settings["scenario"], one.settings["seed"], *one.speeds
 
 
 def beaten(summary: pd.DataFrame, *, controller: str) -> tuple[float, int, int]:

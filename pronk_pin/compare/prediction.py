@@ -132,7 +132,7 @@ def stored_practice(
         if not np.isclose(experiment.speeds, speed, atol=1e-6).any():
             there = ", ".join(f"{one:g}" for one in experiment.speeds)
             raise InvalidInput(f"this result has no speed {speed:g} m/s; choose from {there}")
-    return results.strides(results.find(controller=spec.name, scenario=scenario.name))
+    return results.all_strides(controller=spec.name, scenario=scenario.name)
 
 
 def compare_prediction(

@@ -15,6 +15,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_info
+
 _PACKAGES = ("pronk-pin", "pin", "example-robot-data", "mujoco", "proxsuite", "numpy", "scipy")
 _TIMEOUT = 10.0  # [s], for git
 
@@ -31,10 +33,20 @@ def describe_run() -> dict[str, Any]:
         "versions": versions(),
         "python": platform.python_version(),
         "platform": platform.platform(),
-        "cpu": cpu_name(),
+        **machine(),
         "cores": os.cpu_count(),
         "git": git_state(),
     }
+
+
+def machine() -> dict[str, str]:
+    """Processor and BLAS kernels: with the versions, what the last bits of numbers depend on."""
+    kernels = {
+        " ".join(str(info.get(key)) for key in ("internal_api", "version", "architecture"))
+        for info in threadpool_info()
+        if info.get("user_api") == "blas"
+    }
+    return {"cpu": cpu_name(), "blas": ", ".join(sorted(kernels))}
 
 
 def cpu_name() -> str:

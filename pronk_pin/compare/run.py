@@ -38,11 +38,12 @@ _one_at_a_time = threading.Lock()
 
 def run_experiment(
     experiment: Experiment,
-    folder: Path,
+    folder: Path | str,
     *,
     workers: int | None = None,
     executor: Executor | str | None = None,
     progress: bool = True,
+    resimulate: bool = False,
 ) -> Results:
     """Run what is missing of an experiment, and write its summary.
 
@@ -51,16 +52,23 @@ def run_experiment(
 
     Args:
         experiment: What to run.
-        folder: The results folder; one that holds part of the same experiment is completed.
+        folder: The results folder. One that holds a part is completed; one with other controllers,
+            scenarios, speeds or seeds is extended, and keeps what it has.
         workers: Processes; by default one for each core. A script that asks for more than one must
             guard its own main code with `if __name__ == "__main__"`.
         executor: Who runs the cells instead of these processes: any `concurrent.futures.Executor`,
             or the address "dask://HOST:PORT" of a dask scheduler.
         progress: Show a progress bar.
+        resimulate: Simulate again what the folder has damaged, or of something else; otherwise it
+            is refused by name.
+
+    Returns:
+        The results, of everything that the folder has.
 
     Raises:
-        FileProblem: The folder cannot be written, holds another experiment, was begun with other
-            versions or another MJCF, or another run is writing there; or the MJCF cannot be read.
+        FileProblem: The folder cannot be written, holds another experiment or strides of one, was
+            begun with other versions or another MJCF, or another run is writing there; or the MJCF
+            cannot be read.
         InvalidInput: The MJCF is not of this robot, or no worker is allowed.
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
@@ -68,32 +76,66 @@ def run_experiment(
     workers = workers if workers is not None else os.cpu_count() or 1
     if workers < 1:
         raise InvalidInput(f"{workers} workers; at least one is needed")
-    results = Results.create(experiment, folder)
-    with results.locked():
-        cells = [cell for cell in experiment.cells() if not results.has(cell)]
-        if not cells and results.provenance["finished"]:
-            results.summarize()
-            return results  # who made the strides stays on record
-        results.check_versions()
-        results.check_foreign()
-        robots = len(experiment.speeds)
-        with tqdm(
-            total=sum(map(_robot_steps, cells)),
-            desc=f"simulating {robots} robots x {len(cells)}",
-            unit=" robot-steps",
-            unit_scale=True,
-            mininterval=0.5 if sys.stderr.isatty() else 10.0,
-            disable=not progress or not cells,
-        ) as bar:
-            run = _Run(results, bar)
-            if executor is None and (workers == 1 or len(cells) <= 1):
-                run.here(cells)
-            else:
-                run.elsewhere(cells, _crew(executor, min(workers, len(cells))))
-        began = time.monotonic()
-        results.summarize()
-        run.finish(summary=time.monotonic() - began)
+    folder = Path(folder)
+    fresh = not folder.exists()
+    results = Results.create(experiment, folder, resimulate=resimulate)
+    try:
+        with results.locked():
+            _complete(results, workers, executor, progress=progress, resimulate=resimulate)
+    except BaseException:
+        if fresh:
+            results.remove_if_empty()
+        raise
     return results
+
+
+def _complete(
+    results: Results,
+    workers: int,
+    executor: Executor | str | None,
+    *,
+    progress: bool,
+    resimulate: bool,
+) -> None:
+    """Simulate what is missing, and summarize."""
+    cells = _missing(results, resimulate=resimulate)
+    if not cells and results.provenance["finished"]:
+        results.summarize()
+        return  # who made the strides stays on record
+    results.check_versions()
+    results.check_foreign()
+    with tqdm(
+        total=sum(map(_robot_steps, cells)),
+        desc=f"simulating {len(results.experiment.speeds)} robots x {len(cells)}",
+        unit=" robot-steps",
+        unit_scale=True,
+        mininterval=0.5 if sys.stderr.isatty() else 10.0,
+        disable=not progress or not cells,
+    ) as bar:
+        run = _Run(results, bar, set(cells))
+        if executor is None and (workers == 1 or len(cells) <= 1):
+            run.here(cells)
+        else:
+            run.elsewhere(cells, _crew(executor, min(workers, len(cells))))
+    began = time.monotonic()
+    results.summarize()
+    run.finish(summary=time.monotonic() - began)
+
+
+def _missing(results: Results, *, resimulate: bool) -> list[Cell]:
+    """The cells that have to be simulated."""
+    missing: list[Cell] = []
+    for cell in results.experiment.cells():
+        try:
+            there = results.has(cell)
+        except FileProblem:
+            if not resimulate:
+                raise
+            results.path(cell).unlink(missing_ok=True)
+            there = False
+        if not there:
+            missing.append(cell)
+    return missing
 
 
 def _crew(
@@ -126,6 +168,7 @@ class _Run:
 
     results: Results
     bar: tqdm[Any]
+    missing: set[Cell]
     began: float = field(default_factory=time.monotonic)
 
     def __post_init__(self) -> None:
@@ -152,7 +195,7 @@ class _Run:
             with open_crew() as crew:
                 self._record["executor"] = crew.name
                 try:
-                    return self._play(crew, [c for c in cells if not self.results.has(c)])
+                    return self._play(crew, [c for c in cells if c in self.missing])
                 except crew.lost as error:
                     reason = error
         raise WorkerLost(self.results.folder) from reason
@@ -164,7 +207,7 @@ class _Run:
         try:
             while waiting or running:
                 for cell in waiting.copy():
-                    if cell.practised is None or self.results.has(cell.practised):
+                    if cell.practised is None or cell.practised not in self.missing:
                         waiting.remove(cell)
                         running[crew.executor.submit(_work, cell, self._practised(cell))] = cell
                 for future in wait(running, timeout=0.2, return_when=FIRST_COMPLETED)[0]:
@@ -196,6 +239,7 @@ class _Run:
 
     def _save(self, cell: Cell, made: Made) -> None:
         self.results.save(cell, made.strides)
+        self.missing.discard(cell)
         self._record["cells"][cell.name] = {
             "simulation_s": round(made.simulation, 2),
             "encoding_s": round(made.encoding, 2),

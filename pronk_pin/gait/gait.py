@@ -6,8 +6,10 @@ on all four feet, then `flight` on none; the touchdown impact closes the cycle.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -158,6 +160,17 @@ class Gait:
     def flight(self) -> GaitPhase:
         """The flight phase."""
         return self.phase("flight")
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the motion: names, feet, durations and coefficients."""
+        digest = hashlib.sha256(repr((self.robot, float(self.speed), float(self.apex))).encode())
+        for phase in self.phases:
+            digest.update(repr((phase.name, tuple(phase.feet), float(phase.duration))).encode())
+            for name in ARRAYS:
+                array = np.ascontiguousarray(getattr(phase, name), dtype="<f8")
+                digest.update(repr((name, array.shape)).encode() + array.tobytes())
+        return digest.hexdigest()
 
     @property
     def duration(self) -> float:

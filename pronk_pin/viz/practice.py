@@ -73,8 +73,7 @@ def practice_programme(
     if speed is not None:
         at = nearest(speeds, speed, "speed")
     scenario = experiment.scenarios[0] if scenario is None else scenario
-    cell = results.find(controller=controller, scenario=scenario)
-    windows = _windows(results.strides(cell))
+    windows = _windows(results.all_strides(controller=controller, scenario=scenario))
     reader = _Reader(results)
     first = {
         SPEED: f"{speeds[at]:g}",
@@ -143,7 +142,7 @@ class _Reader:
 
 @lru_cache(maxsize=8)
 def _load(results: Results, controller: str, scenario: str) -> xr.Dataset:
-    return results.strides(results.find(controller=controller, scenario=scenario))
+    return results.all_strides(controller=controller, scenario=scenario)
 
 
 def _beside(track: Track) -> tuple[float, float, float] | None:

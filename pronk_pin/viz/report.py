@@ -127,8 +127,10 @@ def command(results: Results) -> str:
 
 def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
     """The report's figures about one scenario, by name; those of learning only where `ilc` ran."""
-    cells = [cell for cell in results.experiment.cells() if cell.scenario == scenario]
-    strides = {cell.controller: results.strides(cell) for cell in reversed(cells)}
+    controllers = dict.fromkeys(cell.controller for cell in reversed(results.experiment.cells()))
+    strides = {
+        name: results.all_strides(controller=name, scenario=scenario) for name in controllers
+    }
     found = {
         "errors": figures.errors_by_speed(results.summary(), scenario=scenario),
         "learning": figures.learning_curves(strides),

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import os
 import shutil
@@ -17,10 +18,17 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from pronk_pin.compare import Experiment, Results, default_folder, run_experiment, summarize
-from pronk_pin.compare.provenance import git_state
+from pronk_pin.compare import (
+    Experiment,
+    Results,
+    Schedule,
+    default_folder,
+    run_experiment,
+    summarize,
+)
+from pronk_pin.compare.provenance import describe_run, git_state
 from pronk_pin.compare.results import SCHEMA, encode
-from pronk_pin.errors import FileProblem, InvalidInput
+from pronk_pin.errors import FileProblem, UnknownName
 
 
 @pytest.fixture
@@ -59,7 +67,7 @@ def test_the_provenance_says_what_ran_where_and_how_long(comparison: Results) ->
 
 def test_the_config_is_the_experiment_and_nothing_that_changes(comparison: Results) -> None:
     config = json.loads((comparison.folder / "config.json").read_text())
-    assert set(config) == {"schema", "experiment"}
+    assert set(config) == {"schema", "experiment", "definition", "sha256"}
     assert config["experiment"]["schedule"]["learning"] == 6.0
 
 
@@ -123,11 +131,13 @@ def test_strides_survive_the_disk_to_the_bit(copy: Results) -> None:
 
 def test_a_cell_is_found_by_its_controller(comparison: Results) -> None:
     assert comparison.find(controller="ilc", scenario="nominal").name == "ilc_nominal_0"
-    with pytest.raises(InvalidInput) as caught:
+    with pytest.raises(UnknownName) as caught:
         comparison.find(controller="model")
     assert str(caught.value) == (
-        "no 'model' in scenario 'nominal'; the result has ilc, library, pd"
+        "unknown controller of this result 'model'; choose one of: ilc, library, pd"
     )
+    with pytest.raises(UnknownName, match=r"scenario of this result .slope.; .*: nominal"):
+        comparison.find(controller="pd", scenario="slope")
 
 
 def test_the_same_experiment_is_taken_up_again(copy: Results) -> None:
@@ -139,8 +149,14 @@ def test_the_same_experiment_is_taken_up_again(copy: Results) -> None:
 
 
 def test_another_experiment_is_not_mixed_in(copy: Results) -> None:
-    text = message(lambda: Results.create(Experiment(), copy.folder), copy.folder)
-    assert text == "holds another experiment; choose another folder"
+    other = dataclasses.replace(copy.experiment, base="free", schedule=Schedule(scatter=0.0))
+    text = message(lambda: Results.create(other, copy.folder), copy.folder)
+    assert text == (
+        "holds another experiment (base is 'locked' there, and 'free' here; schedule.practice is "
+        "4.0 there, and 20.0 here; schedule.learning is 6.0 there, and 20.0 here; schedule.scatter "
+        "is 0.01 there, and 0.0 here); leave these options out to go on with it, or choose another "
+        "folder"
+    )
 
 
 def test_a_folder_that_holds_no_result_is_refused(tmp_path: Path) -> None:
@@ -186,27 +202,41 @@ def test_damaged_strides_are_refused(copy: Results, keep: float) -> None:
     copy.path(cell).write_bytes(whole[: int(keep * len(whole)) if keep < 1 else int(keep)])
     text = message(lambda: copy.strides(cell), copy.path(cell))
     assert text.startswith("damaged (")
-    assert text.endswith("; delete it and run 'pronk-pin compare --folder' again")
+    assert text.endswith(f"; {anew(copy)}")
+
+
+def anew(results: Results) -> str:
+    return f"run 'pronk-pin compare --folder {results.folder} --resimulate' to make it anew"
 
 
 def test_missing_strides_are_refused(copy: Results) -> None:
     cell = copy.find(controller="ilc")
     copy.path(cell).unlink()
     text = message(lambda: copy.strides(cell), copy.path(cell))
-    assert text == "missing; run the same 'pronk-pin compare --folder' again"
+    assert text == f"missing; {anew(copy)}"
 
 
-def test_a_missing_summary_is_refused(copy: Results) -> None:
-    (copy.folder / "summary.csv").unlink()
-    text = message(copy.summary, copy.folder / "summary.csv")
-    assert text == f"missing; run 'pronk-pin compare --folder {copy.folder}' to make it"
-
-
-@pytest.mark.parametrize("contents", [b"", b"a,b\n1,2\n", b"\x93\xff\x00", b'"a\n'])
-def test_a_damaged_summary_is_refused(copy: Results, contents: bytes) -> None:
+@pytest.mark.parametrize(
+    "contents", [None, b"", b"a,b\n1,2\n", b"\x93\xff\x00", b'"a\n', "half", "a digit"]
+)
+def test_a_summary_that_is_missing_damaged_or_cut_is_made_again_from_the_strides(
+    comparison: Results, copy: Results, contents: bytes | str | None
+) -> None:
     path = copy.folder / "summary.csv"
-    path.write_bytes(contents)
-    assert message(copy.summary, path).startswith("damaged (")
+    whole = path.read_bytes()
+    if contents is None:
+        path.unlink()
+    elif contents == "half":
+        path.write_bytes(whole[: len(whole) // 2].rpartition(b"\n")[0] + b"\n")
+    elif contents == "a digit":
+        path.write_bytes(whole.replace(b"5", b"6", 1))
+    else:
+        assert isinstance(contents, bytes)
+        path.write_bytes(contents)
+    pd.testing.assert_frame_equal(
+        copy.summary(), comparison.summary(), check_dtype=False, rtol=1e-12
+    )
+    assert path.read_bytes() == whole
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
@@ -230,12 +260,17 @@ def test_only_the_variables_asked_for_are_read(comparison: Results) -> None:
     assert few.identical(comparison.strides(cell)[["count", "peak_error"]])
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs Linux's full device")
 @pytest.mark.parametrize("name", ["strides/pd_nominal_0.nc", "summary.csv", "config.json"])
-def test_a_full_disk_loses_nothing_that_was_there(copy: Results, name: str) -> None:
+def test_a_full_disk_loses_nothing_that_was_there(
+    copy: Results, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = copy.folder / name
     before = path.read_bytes()
-    path.with_name(path.name + ".partial").symlink_to("/dev/full")
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
     text = message(lambda: copy.write(name, b"new"), path)
     assert text == (
         "cannot be written (No space left on device); make room, and run the same command again "
@@ -291,6 +326,7 @@ def test_a_summary_that_cannot_be_written_is_reported(copy: Results) -> None:
 @contextlib.contextmanager
 def read_only(folder: Path) -> Iterator[None]:
     """Take away the right to write in a folder, from the administrator too."""
+    describe_run()  # imports what nobody may read where Python lies in the administrator's home
     nobody, administrator = 65534, os.geteuid() == 0
     parts = [folder, *(part for part in folder.rglob("*") if part.is_dir())]
     above = [part for part in folder.parents if part.stat().st_uid == os.geteuid()]
@@ -319,8 +355,8 @@ def test_a_read_only_folder_loses_nothing_and_is_named(copy: Results) -> None:
     before = everything(copy.folder)
     with read_only(copy.folder):
         for name, call in (
-            (copy.path(cell), lambda: copy.save(cell, b"new")),
-            (copy.folder / "summary.csv", copy.summarize),
+            (copy.folder / "manifest.json", lambda: copy.save(cell, b"new")),
+            (copy.folder / "manifest.json", copy.summarize),
         ):
             text = message(call, name)
             assert text.startswith("cannot be written (Permission denied); ")

@@ -34,7 +34,8 @@ def test_a_run_leaves_strides_summary_and_config_and_nothing_else(comparison: Re
         path.relative_to(comparison.folder).as_posix() for path in comparison.folder.rglob("*")
     }
     strides = {f"strides/{name}_nominal_0.nc" for name in ("pd", "ilc", "library")}
-    assert files == {"config.json", "provenance.json", "summary.csv", "strides", *strides}
+    written = {"config.json", "manifest.json", "provenance.json", "summary.csv"}
+    assert files == {*written, "strides", *strides}
 
 
 @pytest.mark.parametrize("controller", ["pd", "library"])
@@ -80,7 +81,7 @@ def test_an_error_in_a_process_arrives_as_it_was_raised(copy: Results) -> None:
         copy.path(copy.find(controller=controller)).unlink()
     learned = copy.path(copy.find(controller="ilc"))
     learned.write_bytes(b"no strides")
-    with pytest.raises(FileProblem, match=r"damaged \(.*\); delete it and run") as caught:
+    with pytest.raises(FileProblem, match=r"damaged \(.*\); run .* --resimulate") as caught:
         run_experiment(copy.experiment, copy.folder, workers=2, progress=False)
     assert caught.value.path == learned
 
