@@ -68,13 +68,15 @@ def practice_programme(
     speeds, controllers = list(experiment.speeds), list(experiment.controllers)
     if controller is None:
         controller = "ilc" if "ilc" in controllers else controllers[0]
-    wanted = SHOWN_SPEED if speed is None else speed
-    at = int(np.argmin(np.abs(np.asarray(speeds) - wanted)))
-    if speed is not None:
-        at = nearest(speeds, speed, "speed")
     scenario = experiment.scenarios[0] if scenario is None else scenario
     cell = results.find(controller=controller, scenario=scenario)
-    windows = _windows(results.strides(cell))
+    strides = results.strides(cell)
+    windows = _windows(strides)
+    if speed is not None:
+        at = nearest(speeds, speed, "speed")
+    else:  # of those that have something to show
+        distance = np.abs(np.asarray(speeds) - SHOWN_SPEED)
+        at = int(np.argmin(np.where(strides["count"] > 0, distance, np.inf)))
     reader = _Reader(results)
     first = {
         SPEED: f"{speeds[at]:g}",

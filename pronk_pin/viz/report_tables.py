@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from ..compare.practice import RIVAL
+from ..compare.practice import LEARNER, RIVAL
 from ..compare.tables import SHOWN, WORLD
-from ..compare.words import LEARNER, against_model, beat_text, between, number
+from ..compare.words import against_model, beat_text, between, number
 from ..parity import Parity, Row, format_value, merged
 from .figures import LABELS
 from .style import in_order
