@@ -318,19 +318,25 @@ def _sampled(document: Document, results: Results, summary: pd.DataFrame, world:
 
 def _provenance(document: Document, results: Results) -> None:
     document.heading("Where these numbers come from", "provenance")
-    document.text("Made again, to the bit with the same versions, by")
+    document.text(
+        "Made again by this command, to the bit with the same versions, the same BLAS kernel and a "
+        "processor of the same family:"
+    )
     lines = textwrap.wrap(command(results), 96, break_long_words=False, break_on_hyphens=False)
     document.text(" \\\n    ".join(lines), "code")
     document.text(
-        "Every number stands in `summary.csv`, every stride in `strides/`, who made them and when "
-        "in `provenance.json`."
+        "Every number stands in `summary.csv`, every stride in `strides/`, when they were made and "
+        "how long it took in `provenance.json`."
     )
-    runs = results.provenance["runs"]
-    for k, run in enumerate(runs):
-        if len(runs) > 1:
-            document.heading(f"Run {k + 1} of {len(runs)}", f"run-{k + 1}", level=3)
-        rows = pd.DataFrame.from_dict(report_tables.provenance(run), orient="index", columns=[""])
-        document.table(rows, left=True)
+    # However often the run was interrupted: each machine, commit and set of versions once.
+    made: list[dict[str, str]] = []
+    for run in results.provenance["runs"]:
+        found = report_tables.provenance(run)
+        made += [found] if found not in made else []
+    for k, found in enumerate(made, start=1):
+        if len(made) > 1:
+            document.heading(f"Made with, {k} of {len(made)}", f"run-{k}", level=3)
+        document.table(pd.DataFrame.from_dict(found, orient="index", columns=[""]), left=True)
     seeds = ", ".join(map(str, results.experiment.seeds))
     if results.foreign is not None:
         document.text(
