@@ -7,22 +7,28 @@ import shutil
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
-from pronk_pin.compare import Results
+from pronk_pin.compare import Results, Simulation
 from pronk_pin.compare.changes import format_changes
+from pronk_pin.compare.gains import describe_gains, judged
 from pronk_pin.compare.limits import limitations
 from pronk_pin.compare.metrics import summarize
 from pronk_pin.compare.practice import lessons, practice
 from pronk_pin.compare.reproduce import format_reproduction
+from pronk_pin.compare.seeding import LEARNERS, describe_seeding
 from pronk_pin.compare.statistics import compare_controllers
 from pronk_pin.compare.tables import beside_the_paper, overview, sampled_worlds, worst_reduction
+from pronk_pin.compare.transfer import describe_transfers
 from pronk_pin.compare.words import format_suite, format_tables, suite_verdict, verdict
 from pronk_pin.control import SKIPPED
+from pronk_pin.viz.learning_figures import errors_by_seed
 
 
 @pytest.fixture(autouse=True)
@@ -300,3 +306,77 @@ def test_a_simulation_without_a_finished_stride_can_be_summarised(comparison: Re
     table = summarize(none)
     assert table[table["metric"] == "upright"]["value"].isna().tolist() == [True, True]
     assert np.isnan(practice(none).upright).all()
+
+
+def sweep(**changed: tuple[float, ...]) -> pd.DataFrame:
+    """A sweep of gains of two robots: all and half the gains, without and with what was learned."""
+    columns = {"thigh": (0.1, 0.02, 0.2, 0.03), "calf": (0.1, 0.02, 0.2, 0.03)}
+    columns |= {"upright": (2, 2, 2, 2), **changed}
+    table = pd.DataFrame({"share": (1.0, 1.0, 0.5, 0.5), "learned": (False, True) * 2, **columns})
+    return table.assign(robots=2)
+
+
+def test_gains_at_which_all_fall_answer_nothing() -> None:
+    lost = (np.nan, 0.02, 0.2, 0.03)
+    text = describe_gains(sweep(thigh=lost, calf=lost, upright=(0, 2, 2, 2)))
+    assert "Nothing is concluded: no robot stayed up with full gains" in text
+    assert "nan" not in text
+    lost = (0.1, 0.02, np.nan, 0.03)
+    text = describe_gains(sweep(thigh=lost, calf=lost, upright=(2, 2, 0, 2)))
+    assert "Yes: down to 50% of the gains" in text
+    assert "all fell with those gains alone" in text
+    assert "nan" not in text
+
+
+def test_a_transfer_to_where_practice_falls_is_open() -> None:
+    columns = ["task", "thigh", "calf", "thigh_practised", "calf_practised", "reuse", "right"]
+    rows = [
+        ("at home", 0.02, 0.02, 0.02, 0.02, True, True),
+        ("left out +0.30 m/s", 0.03, 0.03, 0.02, 0.02, True, False),
+        ("slope", np.nan, np.nan, np.nan, np.nan, False, True),
+    ]
+    text = describe_transfers(pd.DataFrame(rows, columns=columns))
+    assert "practise again: open, as no robot stayed up that practised there" in text
+    assert "Of 2 answers of the rule 1 let a skill be reused" in text
+    assert "nan" not in text
+    text = describe_transfers(pd.DataFrame(rows[2:], columns=columns))
+    assert "Nothing is concluded: no robot stayed up that practised." in text
+
+
+def test_peaks_of_a_sweep_are_those_of_the_robots_that_stayed_up() -> None:
+    peaks = np.ones((2, 5, 12)) * np.array([0.1, 7.0])[:, None, None]
+    log = SimpleNamespace(peak_error=peaks, count=np.array([5, 5]))
+
+    def found(upright: list[bool]) -> dict[str, float | int]:
+        return judged(cast(Simulation, SimpleNamespace(strides=log, upright=np.array(upright))))
+
+    assert found([True, False])["calf"] == pytest.approx(0.1)
+    assert found([True, False])["upright"] == 1
+    assert np.isnan(found([False, False])["calf"])
+
+
+def seeded(fallen: tuple[str, ...]) -> pd.DataFrame:
+    """Two speeds under each of the learners; some controllers' robots fall at 0.2 m/s."""
+    rows = [
+        {"controller": name, "speed": speed, "stride": k, "thigh": error, "calf": error}
+        | {"upright": not (name in fallen and speed == 0.2 and k > 5)}
+        for name in LEARNERS
+        for speed, scale in ((0.2, 10.0), (0.3, 1.0))
+        for k, error in enumerate(scale * 0.01 * (1.0 + 9.0 * 0.5 ** np.arange(20)))
+    ]
+    return pd.DataFrame(rows)
+
+
+def test_seeds_are_compared_by_the_robots_that_stayed_up() -> None:
+    text = describe_seeding(seeded(("model+ilc",)))
+    assert ", 1 of 2, 1 fell" in text
+    (line,) = (line for line in text.splitlines() if "1 fell" in line)
+    assert "0.1000" in line  # of 0.3 m/s alone
+    assert "1.0000" not in line
+    alone = seeded(LEARNERS)
+    text = describe_seeding(alone[alone["speed"] == 0.2])
+    assert text.count("never, 1 fell") == len(LEARNERS)
+    assert "nan" not in text
+    assert errors_by_seed(alone[alone["speed"] == 0.2]).axes[0].texts[0].get_text() == (
+        "no robot stayed up"
+    )
