@@ -128,6 +128,7 @@ class _Reader:
         learned = shown["start"].to_numpy()[shown["learning"].to_numpy() == 1]
         began = float(learned[0] - shown["start"][0]) if learned.size else 0.0
         note = f"; learning starts after {began:.1f} s" if began > 0.0 else ""
+        note += "; the robot fell" if bool((shown["upright"] == 0).any()) else ""
         return Scene(
             robot,
             tracks,

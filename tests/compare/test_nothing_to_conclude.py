@@ -29,6 +29,7 @@ from pronk_pin.compare.transfer import describe_transfers
 from pronk_pin.compare.words import format_suite, format_tables, suite_verdict, verdict
 from pronk_pin.control import SKIPPED
 from pronk_pin.viz.learning_figures import errors_by_seed
+from pronk_pin.viz.suite_figures import by_world
 
 
 @pytest.fixture(autouse=True)
@@ -204,7 +205,10 @@ def test_sampled_worlds_of_the_fallen_are_not_counted_as_lost(summary: pd.DataFr
     check_words(format_tables(some, scenario="random-4"))
     nobody = pd.concat(map(let_fall, worlds), ignore_index=True)
     assert verdict(nobody, scenario="random-4").startswith("Nothing is concluded: no robot stayed")
-    assert sampled_worlds(nobody, scenario="random-4")["calf"].isna().to_numpy().all()
+    drawn = sampled_worlds(nobody, scenario="random-4")
+    assert drawn["calf"].isna().to_numpy().all()
+    panels = by_world(drawn).axes
+    assert [axes.texts[0].get_text() for axes in panels] == ["no robot stayed up"] * 2
     check_words(format_tables(nobody, scenario="random-4"))
 
 

@@ -185,13 +185,20 @@ def test_replays_show_the_fallen_and_leave_out_what_there_is_not(
     cell = sound.find(controller="ilc")
     strides = sound.strides(cell)
 
-    def made(befall: Spoil) -> str:
+    def spoiled(befall: Spoil) -> Results:
         folder = shutil.copytree(sound.folder, Path(tempfile.mkdtemp(dir=tmp_path)) / "spoiled")
         results = Results(folder, sound.experiment)
         results.save(cell, befall(strides).assign_attrs(strides.attrs))
-        return write_replay(practice_programme(results), folder / "replay.html").read_text()
+        return results
+
+    def made(befall: Spoil) -> str:
+        results = spoiled(befall)
+        page = write_replay(practice_programme(results), results.folder / "replay.html")
+        return page.read_text()
 
     assert '"before learning"' in made(fall)
+    assert practice_programme(spoiled(fall)).scene().caption.endswith("; the robot fell")
+    assert "fell" not in practice_programme(sound).scene().caption
     always = made(set_to(learning=1.0))  # there is nothing before the learning
     assert '"before learning"' not in always
     assert '"speed [m/s]": ["0.3"]' in made(finish_nothing)
