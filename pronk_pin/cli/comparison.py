@@ -190,4 +190,8 @@ def _write_pages(results: Results) -> None:
     """The report and the replay of a result, with their names printed."""
     print(f"\nresults  {results.folder}")
     print(f"report   {write_report(results)}")
-    print(f"replay   {write_replay(practice_programme(results), results.folder / 'replay.html')}")
+    try:
+        replay = str(write_replay(practice_programme(results), results.folder / "replay.html"))
+    except InvalidInput as error:  # no stride was finished
+        replay = f"none: {error}"
+    print(f"replay   {replay}")

@@ -12,6 +12,7 @@ from ..errors import InvalidInput
 from .results import Results
 from .statistics import compare_pairs, family, robots
 from .tables import SHOWN
+from .words import between, number
 
 LEVEL = 0.05
 """Share of false alarms among the changes that are named."""
@@ -74,12 +75,14 @@ def format_changes(first: Results, second: Results) -> str:
             f"{'difference':>10} {'95 % interval':>18}  {'p':>7}  change",
             *(_line(key, row) for key, row in named.iterrows()),
         ]
-    same = len(table) - len(named)
+    silent = int((table["robots"] == 0).sum() - (named["robots"] == 0).sum())
+    same = len(table) - len(named) - silent
     identical = int(((table["difference"] == 0.0) & (table["p"].isna())).sum())
     lines.append(
         f"{len(named)} of {len(table)} mean peak errors changed beyond noise (at most {LEVEL:.0%} "
         f"of those named are false alarms); {same} did not"
         + (f", {identical} of them are the same to the bit." if identical else ".")
+        + (f" Of {silent} nothing is concluded: no robot stayed up in both." if silent else "")
     )
     return "\n".join(lines)
 
@@ -156,10 +159,11 @@ def _short(value: object) -> str:
 
 def _line(key: Any, row: pd.Series) -> str:
     world, controller, joint = key
-    interval = f"{row['difference_low']:+.4f} to {row['difference_high']:+.4f}"
+    interval = between(row, "difference", "+.4f")
     fell = row["fallen_after"] - row["fallen_before"]
     falls = f" ({fell:+d} fell)" if fell else ""
     return (
-        f"{world:>14} {controller:>12} {joint:>6}  {row['before']:7.4f} {row['after']:7.4f} "
-        f"{row['difference']:+10.4f} {interval:>18}  {row['p']:7.1g}  {row['change']}{falls}"
+        f"{world:>14} {controller:>12} {joint:>6}  {number(row['before'], '.4f'):>7} "
+        f"{number(row['after'], '.4f'):>7} {number(row['difference'], '+.4f'):>10} "
+        f"{interval:>18}  {number(row['p'], '.1g'):>7}  {row['change']}{falls}"
     )

@@ -11,11 +11,12 @@ import pandas as pd
 from ..control import ControllerSpec, Gains, Skill
 from ..errors import InvalidInput
 from ..gait import Gait, load_library
-from ..robot import JOINTS, Robot, load_robot
+from ..robot import JOINTS, NL, Robot, load_robot
 from .metrics import STEADY_STRIDES
 from .scenario import Scenario
 from .schedule import Schedule
 from .simulate import Simulation
+from .words import number
 
 SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Feedback gains of the sweep, over the controller's own."""
@@ -74,7 +75,8 @@ def describe_gains(table: pd.DataFrame) -> str:
     ]
     for share, pair in table.groupby("share", sort=False):
         cells = "".join(
-            f"    {row.thigh:7.4f} {row.calf:7.4f}  {row.upright:2d} of {row.robots:2d}    "
+            f"    {number(row.thigh, '.4f'):>7} {number(row.calf, '.4f'):>7}  "
+            f"{row.upright:2d} of {row.robots:2d}    "
             for row in pair.sort_values("learned").itertuples()
         )
         lines.append(f"{float(str(share)):5.0%}  {cells.rstrip()}")
@@ -83,6 +85,8 @@ def describe_gains(table: pd.DataFrame) -> str:
 
 def _answer(table: pd.DataFrame) -> str:
     full = table[(table["share"] == table["share"].max()) & ~table["learned"]].iloc[0]
+    if not full["upright"]:
+        return "Nothing is concluded: no robot stayed up with full gains and without learning."
     good = table[
         table["learned"]
         & (table["thigh"] <= full["thigh"])
@@ -94,10 +98,11 @@ def _answer(table: pd.DataFrame) -> str:
         return "No: with smaller gains, what was learned does not track as well as full gains did."
     least = smaller.loc[smaller["share"].idxmin()]
     plain = table[(table["share"] == least["share"]) & ~table["learned"]].iloc[0]
+    alone = f"{plain['calf']:.3f}" if plain["upright"] else "all fell"
     return (
         f"Yes: down to {least['share']:.0%} of the gains, what was learned tracks at least as well "
         f"as full\ngains without it ({least['calf']:.3f} against {full['calf']:.3f} rad in the "
-        f"calf; {plain['calf']:.3f} with those gains alone)."
+        f"calf; {alone} with those gains alone)."
     )
 
 
@@ -125,14 +130,18 @@ def simulate(
 
 
 def judged(simulation: Simulation, robot: int | None = None) -> dict[str, float | int]:
-    """Mean peaks over the last strides of the robots, or one, and how many robots stayed up."""
+    """Mean peaks over the last strides of the robots, or one, and how many robots stayed up.
+
+    Means are over those that stayed up; NaN without one.
+    """
     log = simulation.strides
     steady = [
         log.peak_error[k, max(0, count - STEADY_STRIDES) : count].mean(axis=0)
         for k, count in enumerate(log.count)
-        if robot in (None, k)
+        if robot in (None, k) and simulation.upright[k] and count
     ]
-    peaks = np.mean(steady, axis=0).reshape(-1, len(JOINTS)).mean(axis=0)
+    legs = np.mean(steady, axis=0) if steady else np.full(NL, np.nan)
+    peaks = legs.reshape(-1, len(JOINTS)).mean(axis=0)
     upright = simulation.upright
     return {
         **{joint: float(peak) for joint, peak in zip(JOINTS, peaks, strict=True)},

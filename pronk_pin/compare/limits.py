@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -61,8 +62,13 @@ def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
     worlds, seeds = results.experiment.scenarios, results.experiment.seeds
     first = summary["controller"].iloc[0]
     families = {family(world) for world in worlds}
+    cells = itertools.product(sorted(families), summary["controller"].unique(), SHOWN)
+    means = sum(np.isfinite(_mean_of(summary, *cell)) for cell in cells)
+    if not means:
+        yield "No robot stayed up: there is no mean error, and no interval, in this result."
+        return
     units = {unit_of(robots(summary, scenario=name, controller=first)) for name in families}
-    if units == {"speed"}:
+    if units == {"speed"} and len(results.experiment.speeds) > 1:
         count = "One seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
         yield (
             f"{count}: fewer than {LEAST_UNITS} are no sample, so intervals are drawn over the "
@@ -79,20 +85,30 @@ def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
         "Seeds differ in the starting posture alone where the world is not sampled and has no "
         "noise; a steady gait forgets it, and intervals over such seeds are small."
     )
-    pairs = len(families) * summary["controller"].nunique() * len(SHOWN)
     yield (
-        f"Each interval holds its value with {CONFIDENCE:.0%}; of the {pairs} mean errors here, "
-        f"about {(1 - CONFIDENCE) * pairs:.0f} intervals miss theirs by chance."
+        f"Each interval holds its value with {CONFIDENCE:.0%}; of the {means} mean errors here, "
+        f"about {(1 - CONFIDENCE) * means:.0f} intervals miss theirs by chance."
     )
+
+
+def _mean_of(
+    summary: pd.DataFrame, scenario: str, controller: str, joint: str, metric: str = "peak_error"
+) -> float:
+    """Mean over the robots that did not fall; NaN without one."""
+    found = robots(summary, scenario=scenario, controller=controller, metric=metric, joint=joint)
+    return float(found.stack().mean())
 
 
 def _of_the_metrics(summary: pd.DataFrame) -> Iterator[str]:
     def mean(metric: str, controller: str, joint: str) -> float:
-        name = family(summary["scenario"].iloc[0])
-        found = robots(summary, scenario=name, controller=controller, metric=metric, joint=joint)
-        return float(np.nanmean(found.to_numpy(dtype=float)))
+        first = family(summary["scenario"].iloc[0])
+        return _mean_of(summary, first, controller, joint, metric)
 
-    shown = set(summary["controller"])
+    shown = {
+        name
+        for name in summary["controller"].unique()
+        if all(np.isfinite(mean("contact_error", name, joint)) for joint in SHOWN)
+    }
     yield (
         "Peaks are against the unmodified reference, means over the legs and the last 30 strides; "
         "the paper does not say how its peaks are taken (`pronk-pin reproduce` tries them)."
@@ -153,7 +169,13 @@ def _of_the_motion(summary: pd.DataFrame) -> Iterator[str]:
             f"In {scenario} under {controller} {_robots(len(rows))} fell ({speeds} m/s): the "
             "errors of those that fell are not in the means."
         )
+    idle = summary[(summary["metric"] == "upright") & summary["value"].isna()]
+    for (scenario, controller), rows in idle.groupby(["scenario", "controller"]):
+        yield f"In {scenario} under {controller} {_robots(len(rows))} finished no stride."
+    keys = ["scenario", "controller", "speed", "seed"]
+    fell = pd.MultiIndex.from_frame(fallen[keys])
     apex = summary[(summary["metric"] == "apex_deviation") & (summary["value"] > _STEADY_APEX)]
+    apex = apex[~pd.MultiIndex.from_frame(apex[keys]).isin(fell)]
     for (scenario, controller), rows in apex.groupby(["scenario", "controller"]):
         yield (
             f"In {scenario} under {controller} the apex of {_robots(len(rows))} still varies by "

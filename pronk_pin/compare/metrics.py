@@ -10,6 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from .._typing import Array, BoolArray
+from ..control import SKIPPED
 from ..robot import JOINTS
 from .effort import effort
 
@@ -32,11 +33,13 @@ def steady(strides: xr.Dataset) -> xr.Dataset:
     """The last `STEADY_STRIDES` finished strides of each speed, renumbered from 0.
 
     None from before the learning was switched on, or would have been for a controller that does
-    not learn, so that all are judged on the same strides: fewer, then, after a short learning.
+    not learn, so that all are judged on the same strides: fewer, then, after a short learning. A
+    robot that finished none has NaN in all of them.
     """
     count = strides["count"].to_numpy()
     learned = _switched(strides).sum(axis=1)
-    last = min(STEADY_STRIDES, int(np.where(learned > 0, learned, count).min()))
+    made = np.where(learned > 0, learned, count)[count > 0]
+    last = min(STEADY_STRIDES, int(made.min())) if made.size else 0
     offset = xr.DataArray(np.arange(last), dims="stride")
     start = xr.DataArray(count - last, dims="speed", coords={"speed": strides["speed"]})
     return strides.isel(stride=start + offset)
@@ -69,7 +72,9 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
         strides_to_converge: See `strides_to_converge`; thigh and calf, and `-` for the later one.
         strides_to_beat_model: See `compare.practice`; added where the model was run too.
     Per robot:
-        upright: 1 if it never fell.
+        strides_of_learning: Strides that were made with the learning law on; where there are some.
+        skipped_*: How many of them taught nothing, by the reasons of `control.SKIPPED`.
+        upright: 1 if it never fell; NaN, as all the others, if it finished no stride.
         speed_error, apex_error: Steady mean minus the gait's [m/s], [m].
         apex_deviation: Standard deviation of the apex over the steady strides [m].
         stride_duration: Mean duration of a stride [s].
@@ -79,6 +84,8 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
     Args:
         strides: What `Simulation` recorded, as `compare.results` stores it.
     """
+    if strides.sizes["stride"] == 0:
+        strides = strides.reindex(stride=[0])  # of nobody
     settings = {key: strides.attrs[key] for key in ("robot", "base", "scenario", "controller")}
     settings["seed"] = int(strides.attrs["seed"])
     joints = by_joint(strides[["peak_error", "contact_error"]].to_dataarray("name"))
@@ -94,13 +101,14 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
     }
     stance = strides[["feedback", "feedforward"]].sel(part="stance")
     torques = {str(name): _array(stance[name], "phase", "joint") for name in stance}
+    skipped = _array(strides["skipped"]) if "skipped" in strides else None
     spent, switched = effort(strides), _switched(strides)
     rows = []
     for k, speed in enumerate(strides["speed"].to_numpy()):
         count = int(strides["count"][k])
         learning = scalars["learning"][k, :count] == 1
         last = min(STEADY_STRIDES, int(switched[k, :count].sum()) or count)
-        end = slice(count - last, count)
+        end = slice(count - last, max(count, 1))  # without any, one of NaN
         planned = {"mean_speed": speed, "apex": float(strides["planned_apex"][k])}
         found = [
             *_errors({name: values[k, end] for name, values in per_joint.items()}),
@@ -108,6 +116,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
             ("-", "feedback_share", _share(*(torques[name][k, end] for name in torques)), "1"),
             *(("-", name, values[k], unit) for name, (values, unit) in spent.items()),
             *_settling(per_joint["peak_error"][k, :count], learning),
+            *(_lessons(skipped[k, :count][learning]) if skipped is not None else ()),
         ]
         rows += [
             {**settings, "speed": float(speed), **dict(zip(COLUMNS[-4:], row, strict=True))}
@@ -150,12 +159,23 @@ def _settling(peaks: Array, learning: BoolArray) -> Iterator[_Row]:
             yield joint, "strides_to_converge", float(count), "1"
 
 
+def _lessons(reasons: Array) -> Iterator[_Row]:
+    """Strides of learning of one robot, and how many of them taught nothing, by the reason."""
+    if reasons.size:
+        yield "-", "strides_of_learning", float(reasons.size), "1"
+    for number in np.unique(reasons[reasons > 0]):
+        name = SKIPPED[int(number)].replace(" ", "_")
+        yield "-", f"skipped_{name}", float(np.count_nonzero(reasons == number)), "1"
+
+
 def feedback_share(strides: xr.Dataset) -> float:
     """RMS of the feedback torque over the sum of both RMS; NaN where there is no torque at all."""
     return _share(strides["feedback"].to_numpy(), strides["feedforward"].to_numpy())
 
 
 def _share(feedback: Array, feedforward: Array) -> float:
+    if not (np.isfinite(feedback).any() and np.isfinite(feedforward).any()):
+        return float("nan")
     one, other = (float(np.sqrt(np.nanmean(part**2))) for part in (feedback, feedforward))
     return one / (one + other) if one + other > 0.0 else float("nan")
 

@@ -10,10 +10,14 @@ import pandas as pd
 import xarray as xr
 
 from .._typing import Array
+from ..control import SKIPPED
 from .metrics import by_joint, steady
 
 RIVAL = "model"
 """The controller that practice has to beat."""
+
+LEARNER = "ilc"
+"""Practice, when it is asked whether it beats the model."""
 
 JUDGED = ("calf", "thigh")
 """Joints whose error counts."""
@@ -37,7 +41,7 @@ class Practice(NamedTuple):
     level: Array
     """Their means in steady state [rad], shape (n, 2)."""
     upright: Array
-    """1 for robots that never fell, shape (n,)."""
+    """1 for robots that never fell, NaN for those that finished no stride, shape (n,)."""
 
 
 def practice(strides: xr.Dataset) -> Practice:
@@ -53,7 +57,9 @@ def practice(strides: xr.Dataset) -> Practice:
         strides["speed"].to_numpy(),
         tuple(peaks.to_numpy()[k, : count[k]][on[k, : count[k]]] for k in range(len(count))),
         level.transpose("speed", "joint").to_numpy(),
-        np.nanmin(strides["upright"].to_numpy(), axis=1),
+        strides["upright"].transpose("speed", "stride").min("stride").to_numpy()
+        if strides.sizes["stride"]
+        else np.full(len(count), np.nan),
     )
 
 
@@ -95,7 +101,7 @@ def rows_of_beating(practised: list[Practice]) -> Iterator[dict[str, object]]:
                 strides_to_beat(one.learning[k][:, j], float(rival.level[k, j]))
                 for j in range(len(JUDGED))
             ]
-            if not one.upright[k]:
+            if one.upright[k] != 1:
                 counts = [float("nan")] * len(JUDGED)  # who fell has beaten nobody
             for joint, value in zip((*JUDGED, "-"), (*counts, np.max(counts)), strict=True):
                 yield {
@@ -106,6 +112,34 @@ def rows_of_beating(practised: list[Practice]) -> Iterator[dict[str, object]]:
                     "value": float(value),
                     "unit": "1",
                 }
+
+
+class Lessons(NamedTuple):
+    """What strides of learning were worth."""
+
+    strides: int
+    """Strides of all robots that were made with the learning law on."""
+    skipped: Mapping[str, int]
+    """How many of them taught nothing, by the reason."""
+
+    @property
+    def taught(self) -> int:
+        """How many strides something was learned from."""
+        return self.strides - sum(self.skipped.values())
+
+
+def lessons(summary: pd.DataFrame, *, controller: str) -> Lessons | None:
+    """What the strides of learning were worth to a controller; None without such strides."""
+    mine = summary[(summary["controller"] == controller) & (summary["joint"] == "-")]
+    counts = mine.groupby("metric")["value"].sum()
+    if "strides_of_learning" not in counts:
+        return None
+    skipped = {
+        reason: int(counts[name])
+        for reason in SKIPPED
+        if (name := f"skipped_{reason.replace(' ', '_')}") in counts
+    }
+    return Lessons(int(counts["strides_of_learning"]), skipped)
 
 
 def _place(one: Practice) -> tuple[object, ...]:

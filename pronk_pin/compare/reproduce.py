@@ -17,6 +17,7 @@ from .paper import table_1
 from .results import Results
 from .statistics import mean_interval, robots
 from .tables import SHOWN
+from .words import number
 
 _SETTLED = 0.05
 """Time after which the touchdown transient is over [s]."""
@@ -26,7 +27,7 @@ _LEG = "FL"
 
 VARIABLES = (
     *("count", "start", "learning", "planned_duration", "error"),
-    *("peak_error", "rms_error", "contact_error"),
+    *("peak_error", "rms_error", "contact_error", "upright"),
 )
 """What of the strides the readings take."""
 
@@ -73,7 +74,7 @@ def row_by_row(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") ->
 
     Returns:
         Rows by joint, controller and speed; columns `paper`, `peak`, `peak_low`, `peak_high`,
-        `rms` [rad]; intervals are NaN with one seed.
+        `rms` [rad]; intervals are NaN with one seed, and all of ours where no robot stayed up.
     """
     printed = table_1().set_index(["joint", "controller", "speed"])["value"].sort_index()
     rows = []
@@ -103,9 +104,12 @@ def row_by_row(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") ->
 def readings(results: Results, *, learners: tuple[str, ...]) -> pd.DataFrame:
     """Every reading of "tracking error" under PD and the learning laws, and how near it comes.
 
+    Read are the robots that stayed up.
+
     Returns:
         Rows by learner and reading; columns by joint and `pd` or `ilc`: the mean [rad], and
         `distance`: root mean square of ln(ours / paper) over speeds, joints and both controllers.
+        NaN without any robot.
     """
     printed = table_1().set_index(["joint", "controller", "speed"])["value"].sort_index()
     values = {name: _read(results, name) for name in ("pd", *learners)}
@@ -119,9 +123,9 @@ def readings(results: Results, *, learners: tuple[str, ...]) -> pd.DataFrame:
                     mine = values[ours][reading].sel(joint=joint)
                     row[f"{joint} {paper}"] = float(mine.mean())
                     for speed, value in zip(mine["speed"].to_numpy(), mine.values, strict=True):
-                        if (joint, paper, speed) in printed.index:
+                        if (joint, paper, speed) in printed.index and np.isfinite(value):
                             ratios.append(np.log(value / printed[joint, paper, speed]))
-            row["distance"] = float(np.sqrt(np.mean(np.square(ratios))))
+            row["distance"] = float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
             rows.append(row)
     return pd.DataFrame(rows).set_index(["learner", "reading"]).sort_values("distance")
 
@@ -133,9 +137,10 @@ def _read(results: Results, controller: str) -> dict[str, xr.DataArray]:
         if cell.controller == controller:
             strides = results.strides(cell, VARIABLES)
             strides["error"] = strides["error"].sel(part="stance")
+            stayed = strides["upright"].min("stride") == 1
             end = steady(strides)
             for name, read in READINGS.items():
-                found[name].append(read(end))
+                found[name].append(read(end).where(stayed))
     return {name: xr.concat(parts, "seed").mean("seed") for name, parts in found.items()}
 
 
@@ -150,11 +155,17 @@ def format_reproduction(results: Results, *, learners: tuple[str, ...]) -> str:
         parts.append(
             f"{other}: mean peak "
             + ", ".join(
-                f"{means.loc[joint, 'peak']:.3f} rad {joint} (paper "
+                f"{number(means.loc[joint, 'peak'], '.3f')} rad {joint} (paper "
                 f"{means.loc[joint, 'paper']:.3f})"
                 for joint in SHOWN
             )
         )
+    down = summary[(summary["metric"] == "upright") & (summary["value"] != 1.0)]
+    if len(down):
+        counted = ", ".join(
+            f"{n} under {name}" for name, n in down["controller"].value_counts().items()
+        )
+        parts.append(f"Robots that did not stay up are in no number: {counted}.")
     parts.append(_format_readings(readings(results, learners=learners)))
     return "\n\n".join(parts)
 
@@ -173,19 +184,27 @@ def _format_rows(table: pd.DataFrame, name: str) -> str:
             for speed in pd_.index
         ]
         mean = "  ".join(
-            f"paper {part['paper'].mean():.3f}, ours {part['peak'].mean():.3f}, RMS "
-            f"{part['rms'].mean():.3f};"
+            f"paper {part['paper'].mean():.3f}, ours {number(part['peak'].mean(), '.3f')}, RMS "
+            f"{number(part['rms'].mean(), '.3f')};"
             for part in (pd_, learned)
         )
-        less = [1 - learned[column].mean() / pd_[column].mean() for column in ("paper", "peak")]
-        lines.append(f"  mean  {mean}  less by {less[0]:.0%} in the paper, {less[1]:.0%} here\n")
+        both = pd_["peak"].notna() & learned["peak"].notna()
+        less = [
+            number(1 - learned[both][column].mean() / pd_[both][column].mean(), ".0%")
+            for column in ("paper", "peak")
+        ]
+        compared = f"less by {less[0]} in the paper, {less[1]} here"
+        lines.append(f"  mean  {mean}  {compared if both.any() else 'nothing to compare'}\n")
     return "\n".join(lines).rstrip()
 
 
 def _cells(row: pd.Series) -> str:
     interval = f"{row['peak_low']:.4f} to {row['peak_high']:.4f}"
     interval = interval if np.isfinite(row["peak_low"]) else "-"
-    return f"{row['paper']:9.3f} {row['peak']:6.3f} {interval:>16} {row['rms']:6.3f}"
+    return (
+        f"{number(row['paper'], '.3f'):>9} {number(row['peak'], '.3f'):>6} {interval:>16} "
+        f"{number(row['rms'], '.3f'):>6}"
+    )
 
 
 def _format_readings(table: pd.DataFrame) -> str:
@@ -199,6 +218,6 @@ def _format_readings(table: pd.DataFrame) -> str:
         f"{'':>12} {'the paper':>34}" + "".join(f"{value:10.3f}" for value in paper),
     ]
     for (learner, reading), row in table.iterrows():
-        cells = "".join(f"{row[name]:10.3f}" for name in names)
-        lines.append(f"{learner:>12} {reading:>34}{cells}{row['distance']:10.2f}")
+        cells = "".join(f"{number(row[name], '.3f'):>10}" for name in names)
+        lines.append(f"{learner:>12} {reading:>34}{cells}{number(row['distance'], '.2f'):>10}")
     return "\n".join(lines)

@@ -18,6 +18,7 @@ from .scenario import Scenario
 from .schedule import Schedule
 from .simulate import Simulation
 from .transfer import COMPARED, practise_library
+from .words import number
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")
 """The same laws, from nothing, from the model's feedforward, and from the torque library."""
@@ -66,7 +67,8 @@ def settling(table: pd.DataFrame) -> pd.DataFrame:
     """Strides of learning until thigh and calf have settled, by controller and speed.
 
     All controllers have the same goal: a tenth or less missing of what learning from nothing takes
-    away. It is 0 where the seed alone is there, and NaN where a robot never stays there.
+    away. It is 0 where the seed alone is there, and NaN where a robot never stays there, or falls,
+    or where the one that learns from nothing does, so that there is no goal.
 
     Args:
         table: What `measure_seeding` returns.
@@ -77,16 +79,25 @@ def settling(table: pd.DataFrame) -> pd.DataFrame:
         nothing = curves[LEARNERS[0]]
         final = nothing[-STEADY_STRIDES:].mean(axis=0)
         for name, curve in curves.items():
+            fell = not rows[rows["controller"].isin([name, LEARNERS[0]])]["upright"].all()
             counts = [
-                settling_stride(curve[:, j], float(nothing[0, j]), float(final[j])) - 1.0
+                float("nan")
+                if fell
+                else settling_stride(curve[:, j], float(nothing[0, j]), float(final[j])) - 1.0
                 for j in range(len(COMPARED))
             ]
             found.append({"controller": name, "speed": speed, "strides": float(np.max(counts))})
     return pd.DataFrame(found)
 
 
+def stayed_up(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the robots that did not fall."""
+    stood = table.groupby(["controller", "speed"])["upright"].transform("all")
+    return table[stood.astype(bool)]
+
+
 def describe_seeding(table: pd.DataFrame) -> str:
-    """Medians over the speeds, with their range, as text for a terminal."""
+    """Medians over the speeds, with their range, as text for a terminal; without the fallen."""
     strides, speeds = settling(table), table["speed"].nunique()
     peaks = " ".join(f"{f'stride {k}':>9}" for k in SHOWN)
     lines = [
@@ -94,13 +105,14 @@ def describe_seeding(table: pd.DataFrame) -> str:
         f"begins with   joint   peak [rad]: {peaks}   the end   strides to settle",
     ]
     for name in LEARNERS:
-        mine, counts = table[table["controller"] == name], _of(strides, name)
+        mine = table[table["controller"] == name]
         fell = int((~mine.groupby("speed")["upright"].all()).sum())
+        mine, counts = stayed_up(mine), _of(strides, name)
         took = _settled(counts) + (f", {fell} fell" if fell else "")
         for joint in COMPARED:
             medians = mine.groupby("stride")[joint].median()
-            values = " ".join(f"{medians[k]:9.4f}" for k in SHOWN)
-            end = f"{medians.iloc[-STEADY_STRIDES:].median():9.4f}"
+            values = " ".join(f"{number(medians.get(k, np.nan), '.4f'):>9}" for k in SHOWN)
+            end = f"{number(medians.iloc[-STEADY_STRIDES:].median(), '.4f'):>9}"
             first = joint == COMPARED[0]
             start = _WORDS[load_controller(name).source] if first else ""
             line = f"{start:<12}  {joint:<20}{values} {end}"

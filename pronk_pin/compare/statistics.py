@@ -8,7 +8,8 @@ over other speeds and starting postures like these, and nothing about other worl
 names its unit.
 
 A robot that fell has no error worth a number: it counts among the fallen, loses every comparison
-with one that did not fall, and is left out of means and differences.
+with one that did not fall, and is left out of means and differences. Two that fell say nothing of
+each other.
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ class Comparison(NamedTuple):
     reduction: Interval
     """1 - mean error of the one / mean error of the other."""
     improvement: Interval
-    """Share of the pairs in which the one has the smaller error; ties count half (Wilson)."""
+    """Share of the pairs in which the one has the smaller error; ties count half (Wilson). Pairs of
+    which both fell are left out: NaN without any other."""
     pairs: int
     """Pairs in which neither fell: those of the difference and the reduction."""
     unit: str
@@ -166,9 +168,10 @@ def compare_pairs(
     """Compare two tables of the same robots, as `robots` gives them."""
     both = one.notna() & other.notna()
     (ours, unit), (theirs, _) = _by_unit(one.where(both)), _by_unit(other.where(both))
-    # Worse than any error is a fall; two falls are a tie.
+    # Worse than any error is a fall; of two falls neither wins, and they are no tie either.
     first, second = one.fillna(np.inf), other.fillna(np.inf)
     wins = (first < second).astype(float) + 0.5 * (first == second)
+    wins = wins.where(one.notna() | other.notna())
     return Comparison(
         difference=_bootstrap(np.mean, ours - theirs, rng=rng),
         reduction=_bootstrap(_reduction, ours, theirs, rng=rng),

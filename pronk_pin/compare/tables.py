@@ -10,9 +10,8 @@ import pandas as pd
 
 from .._typing import Array
 from ..robot import JOINTS
-from .metrics import reduction
 from .paper import table_1
-from .practice import RIVAL, beaten
+from .practice import RIVAL, beaten, lessons
 from .scenario import load_scenario
 from .statistics import (
     Interval,
@@ -80,27 +79,33 @@ def sampled_worlds(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
 def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     """Table I: peak stance errors [rad] with PD and with ILC, ours beside the paper's.
 
+    Ours are means over the robots that stayed up; a speed at which none did has no row.
+
     Args:
         summary: The summary of a result that holds `pd` and `ilc`.
         scenario: The world.
 
     Returns:
-        Rows by speed, and one of means; columns by joint, source ("ours", "paper") and quantity
-        ("PD", "ILC", "reduction").
+        Rows by speed, and one of means over the speeds that have all of ours; columns by joint,
+        source ("ours", "paper") and quantity ("PD", "ILC", "reduction"). Empty where nobody stayed
+        up.
     """
-    ours = summary[(summary["metric"] == "peak_error") & (summary["scenario"] == scenario)]
+    printed, shown = (
+        table_1(),
+        [name for name in ("pd", "ilc") if name in set(summary["controller"])],
+    )
     parts = {}
-    for joint in SHOWN:
-        for source, table in (("ours", ours), ("paper", table_1())):
-            rows = table[(table["joint"] == joint) & table["controller"].isin(["pd", "ilc"])]
-            wide = rows.pivot_table(index="speed", columns="controller", values="value")
-            for controller in ("pd", "ilc"):
-                if controller in wide:
-                    parts[joint, source, controller.upper()] = wide[controller]
+    for joint, controller in itertools.product(SHOWN, ("pd", "ilc")):
+        paper = printed[(printed["joint"] == joint) & (printed["controller"] == controller)]
+        parts[joint, "paper", controller.upper()] = paper.set_index("speed")["value"]
+        if controller in shown:
+            peaks = robots(summary, scenario=scenario, controller=controller, joint=joint)
+            parts[joint, "ours", controller.upper()] = peaks.mean()
     table = pd.DataFrame(parts)
     measured = [name for name in table.columns if name[1] == "ours"]
-    table = table.dropna(subset=measured, how="all")
-    table.loc["mean"] = table.mean()
+    table = table.dropna(subset=measured, how="all") if measured else table.iloc[:0]
+    if len(table):
+        table.loc["mean"] = table.dropna(subset=measured).mean()
     for joint in SHOWN:
         for source in ("ours", "paper"):
             if (joint, source, "PD") in table and (joint, source, "ILC") in table:
@@ -119,15 +124,18 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     - `j`: mean peak error [rad], with interval; `j_rms`: mean RMS error [rad];
     - `j_reduction`: of the mean peak against PD's, with interval;
     - `j_model`: 1 where it is better than the model's feedforward beyond doubt, -1 where it is
-      worse, 0 where the interval of the difference holds 0;
+      worse, 0 where the interval of the difference holds 0, NaN without a robot that stayed up
+      under both;
     - `j_difference`: of the mean peak from the model's, pair by pair [rad], with interval;
     - `j_wins`: share of the robots that have a smaller error than with the model, with interval;
     - `beat_strides`, `beat`, `learners`: strides of learning until calf and thigh beat the model
       (median over the robots that do), how many do, of how many;
-    - `strides`: to converge, the slowest robot; NaN if one does not;
+    - `strides`: to converge, the slowest robot; NaN if one does not, or falls;
+    - `taught`: strides that something was learned from; NaN without learning;
     - `feedback`: its share of the torque; `cost`: mean cost of transport of the robots that move;
     - `speed_error` [m/s], `apex_error` [m]: mean magnitudes;
-    - `upright`: robots that stayed up; `robots`: how many there were;
+    - `upright`: robots that stayed up; `fell`: robots that did not; `robots`: how many there were,
+      with those that finished no stride, of which neither is known;
     - `unit`: what the intervals are drawn over, see `compare.statistics`.
 
     Args:
@@ -168,20 +176,23 @@ def _row(summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[s
             row |= _interval(f"{joint}_reduction", found.reduction)
         if RIVAL in rivals:
             found = compare_controllers(summary, **mine, against=RIVAL, joint=joint)
-            row[f"{joint}_model"] = {True: 1, None: 0, False: -1}[found.better]
+            sign = {True: 1, None: 0, False: -1}[found.better]
+            row[f"{joint}_model"] = sign if found.pairs else np.nan
             row |= _interval(f"{joint}_difference", found.difference)
             row |= _interval(f"{joint}_wins", found.improvement)
-    settled = summary[(summary["controller"] == controller) & (summary["joint"] == "-")]
-    settled = settled[settled["metric"] == "strides_to_converge"]["value"]
-    row["strides"] = settled.max(skipna=False)
+    settled = values("strides_to_converge")
+    row["strides"] = float(settled.max()) if settled.size else np.nan
+    found_lessons = lessons(summary, controller=controller)
+    row["taught"] = np.nan if found_lessons is None else found_lessons.taught
     row["beat_strides"], row["beat"], row["learners"] = beaten(summary, controller=controller)
     row["feedback"] = _mean(values("feedback_share"))
     cost = robots(own, **mine, metric="cost_of_transport", joint="-")
     row["cost"] = _mean(cost.loc[:, np.abs(cost.columns.to_numpy(float)) > _MOVING].to_numpy(float))
     row["speed_error"] = _mean(np.abs(values("speed_error")))
     row["apex_error"] = _mean(np.abs(values("apex_error")))
-    upright = values("upright")
-    row["upright"], row["robots"] = int(np.nansum(upright)), int(np.isfinite(upright).sum())
+    upright = own[own["metric"] == "upright"]["value"]
+    row["upright"], row["fell"] = int((upright == 1.0).sum()), int((upright == 0.0).sum())
+    row["robots"] = len(upright)
     row["unit"] = unit_of(robots(own, **mine, metric="upright", joint="-"))
     return row
 
@@ -196,7 +207,15 @@ def _mean(values: Array) -> float:
 
 
 def worst_reduction(summary: pd.DataFrame, *, scenario: str, controller: str) -> dict[str, float]:
-    """Smallest reduction of the peak error over the speeds, by joint; negative is worse than PD."""
-    peaks = reduction(summary, "peak_error")
-    mine = in_family(peaks[peaks["controller"] == controller], scenario)
-    return {joint: float(mine[mine["joint"] == joint]["value"].min()) for joint in JOINTS}
+    """Smallest reduction of the peak error of any robot, by joint; negative is worse than PD.
+
+    NaN without a robot that stayed up under both.
+    """
+    worst = {}
+    for joint in JOINTS:
+        one, other = (
+            robots(summary, scenario=scenario, controller=name, joint=joint)
+            for name in (controller, "pd")
+        )
+        worst[joint] = float((1.0 - one / other).min(axis=None)) if one.size else np.nan
+    return worst

@@ -19,6 +19,7 @@ from .scenario import Scenario
 from .schedule import Schedule
 from .simulate import Simulation
 from .strides import to_dataset
+from .words import number
 
 TOLERANCE = 0.25
 """By how much a reused skill's error may exceed that where it was learned."""
@@ -118,23 +119,34 @@ def describe_transfers(table: pd.DataFrame) -> str:
     ]
     for row in table.itertuples():
         advice = "reuse" if row.reuse else "practise again"
+        answer = "right" if row.right else "wrong"
+        if np.isnan(row.calf_practised):
+            answer = "open, as no robot stayed up that practised there"
+        peaks = [
+            f"{number(peak, '.4f'):>7}"
+            for peak in (row.thigh, row.calf, row.thigh_practised, row.calf_practised)
+        ]
         lines.append(
-            f"{row.task:<18}  {row.thigh:7.4f} {row.calf:7.4f}       {row.thigh_practised:7.4f} "
-            f"{row.calf_practised:7.4f}   {advice}: {'right' if row.right else 'wrong'}"
+            f"{row.task:<18}  {' '.join(peaks[:2])}       {' '.join(peaks[2:])}   "
+            f"{advice}: {answer}"
         )
     return "\n".join([*lines, "", _in_words(table)])
 
 
 def _in_words(table: pd.DataFrame) -> str:
-    between = table[table["task"].str.startswith("left out")]
+    table = table.dropna(subset=[f"{joint}_practised" for joint in COMPARED])
+    if table.empty:
+        return "Nothing is concluded: no robot stayed up that practised."
+    between = table[table["task"].str.startswith("left out")].dropna()
     more = [
-        between[joint].mean() / between[f"{joint}_practised"].mean() - 1.0 for joint in COMPARED
+        number(between[joint].mean() / between[f"{joint}_practised"].mean() - 1.0, "+.0%")
+        for joint in COMPARED
     ]
     wrong = table[~table["right"]]
     harmful, needless = int(wrong["reuse"].sum()), int((~wrong["reuse"]).sum())
     return (
-        f"At speeds left out the stored skill's mean error is {more[0]:+.0%} in the thigh and "
-        f"{more[1]:+.0%} in the calf\nagainst practice there. Of {len(table)} answers of the rule "
+        f"At speeds left out the stored skill's mean error is {more[0]} in the thigh and "
+        f"{more[1]} in the calf\nagainst practice there. Of {len(table)} answers of the rule "
         f"{harmful} let a skill be reused that practice would better\nby more than "
         f"{TOLERANCE:.0%}, and {needless} asked for practice that gained less."
     )

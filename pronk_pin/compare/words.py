@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
+from .inconclusive import inconclusive, unsaid
+from .practice import LEARNER
 from .statistics import CONFIDENCE, control_arm, family, in_family
 from .tables import (
     SHOWN,
@@ -19,14 +21,13 @@ from .tables import (
     worst_reduction,
 )
 
-LEARNER = "ilc"
-"""Practice, when it is asked whether it beats the model."""
-
 _WIDTH = 100
 
 
 def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None = None) -> str:
     """The answer for one world in words; empty without `pd` and `ilc`.
+
+    Where there is nothing to answer from, it says so, and why.
 
     Args:
         summary: See `compare.metrics`.
@@ -36,6 +37,8 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
     table = overview(summary, scenario=scenario) if table is None else table
     if not {"pd", LEARNER} <= set(table.index):
         return ""
+    if reason := inconclusive(summary, scenario=scenario, table=table, against="pd"):
+        return _joined(f"Nothing is concluded: {reason}.", _fallen(table), _control_arm(summary))
     practice = table.loc[LEARNER]
     if practice["unit"] == "world":
         return _sampled_verdict(summary, scenario, table)
@@ -44,7 +47,7 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
         f"{_percent(practice, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
     )
     settled = (
-        f", within {practice['strides']:.0f} strides at every speed."
+        f", within {_count(int(practice['strides']), 'stride')} at every speed."
         if np.isfinite(practice["strides"])
         else "; at some speed it has not settled."
     )
@@ -52,10 +55,19 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
         f"Practice cuts the mean peak error by {less} against PD ({worst['calf']:.0%} and "
         f"{worst['thigh']:.0%} at the worst speed){settled}"
     ]
-    if "model" in table.index:
+    if reason := _no_rival(summary, scenario, table):
+        sentences.append(reason)
+    elif "model" in table.index:
         sentences.append(_against_the_model(practice, table.loc["model"]))
-    sentences += [_fallen(table), _control_arm(summary)]
-    return " ".join(sentence for sentence in sentences if sentence)
+    return _joined(*sentences, _fallen(table), _control_arm(summary))
+
+
+def _no_rival(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) -> str:
+    """Why nothing is concluded against the model; empty where something is, or it was not run."""
+    if "model" not in table.index:
+        return ""
+    reason = inconclusive(summary, scenario=scenario, table=table, against="model")
+    return f"Against the model's feedforward nothing is concluded: {reason}." if reason else ""
 
 
 def _sampled_verdict(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) -> str:
@@ -71,10 +83,11 @@ def _sampled_verdict(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) 
         f"peak error by {less} against PD ({worst['calf']:.0%} and {worst['thigh']:.0%} for the "
         "worst robot)."
     ]
-    if "model" in table.index:
+    if reason := _no_rival(summary, scenario, table):
+        sentences.append(reason)
+    elif "model" in table.index:
         sentences += _against_the_model_by_world(summary, scenario, table)
-    sentences += [_fallen(table), _control_arm(summary)]
-    return " ".join(sentence for sentence in sentences if sentence)
+    return _joined(*sentences, _fallen(table), _control_arm(summary))
 
 
 def _against_the_model_by_world(
@@ -96,11 +109,12 @@ def _against_the_model_by_world(
         change, low, high = (
             1e3 * practice[f"{joint}_difference{end}"] for end in ("", "_low", "_high")
         )
-        ahead = int((by_world[joint, LEARNER] < by_world[joint, "model"]).sum())
+        both = by_world[joint][[LEARNER, "model"]].dropna()
+        ahead = int((both[LEARNER] < both["model"]).sum())
         yield (
             f"The {joint}'s mean peak is {1e3 * practice[joint]:.1f} against "
             f"{1e3 * model[joint]:.1f} mrad, by paired differences {change:+.1f} mrad ({low:+.1f} "
-            f"to {high:+.1f}); it is less in {ahead} of {len(by_world)} worlds, and the "
+            f"to {high:+.1f}); it is less in {ahead} of {_count(len(both), 'world')}, and the "
             f"probability that a robot improves is {_percent(practice, f'{joint}_wins')}."
         )
     if practice["beat"] > 0:
@@ -130,9 +144,13 @@ def _against_the_model(practice: pd.Series, model: pd.Series) -> str:
 
 
 def _fallen(table: pd.DataFrame) -> str:
-    fallen = int((table["robots"] - table["upright"]).sum())
-    counted = {0: "No robot", 1: "One robot"}.get(fallen, f"{fallen} robots")
-    return f"{counted} fell."
+    fallen, robots = int(table["fell"].sum()), int(table["robots"].sum())
+    idle = robots - fallen - int(table["upright"].sum())
+    if fallen == robots:
+        return f"All {_count(robots, 'robot')} fell."
+    counted = {0: "No robot", 1: "One robot"}
+    text = f"{counted.get(fallen, f'{fallen} robots')} fell."
+    return text + (f" {counted.get(idle, f'{idle} robots')} finished no stride." if idle else "")
 
 
 def _control_arm(summary: pd.DataFrame) -> str:
@@ -160,54 +178,115 @@ def suite_verdict(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -
     if not {"pd", LEARNER, "model"} <= controllers:
         return ""
     practice = table.xs(LEARNER, level="controller")
-    worlds = len(practice)
+    reasons = {
+        str(world): inconclusive(
+            summary, scenario=str(world), table=table.loc[world], against="model"
+        )
+        for world in practice.index
+    }
+    told = practice.loc[[world for world, reason in reasons.items() if not reason]]
     sentences = [
-        f"Does practice beat the model? In {_count(worlds, 'world')}, against the model's "
+        f"Does practice beat the model? In {_count(len(practice), 'world')}, against the model's "
         f"feedforward, by {CONFIDENCE:.0%} intervals of the paired difference:"
     ]
+    sentences += _where_it_beats_the_model(told) if len(told) else []
+    sentences += [
+        f"In {world} nothing is concluded: {reason}." for world, reason in reasons.items() if reason
+    ]
+    sentences += _range_against_pd(told)
+    return _joined(*sentences, _where_robots_fell(table), _control_arm(summary))
+
+
+def _where_it_beats_the_model(practice: pd.DataFrame) -> Iterator[str]:
+    """What practice does in those worlds that tell, one a row."""
     for joint in SHOWN:
         better, worse, open_ = (
             list(practice.index[practice[f"{joint}_model"] == sign]) for sign in (1, -1, 0)
         )
-        parts = [f"In the {joint} it is better in {len(better)} of {worlds}"]
+        parts = [f"In the {joint} it is better in {len(better)} of {len(practice)}"]
         parts += [f"worse in {', '.join(worse)}"] if worse else []
         parts += [f"open in {', '.join(open_)}"] if open_ else []
-        sentences.append("; ".join(parts) + ".")
+        yield "; ".join(parts) + "."
     beat, learners = practice["beat"].sum(), practice["learners"].sum()
     median = practice["beat_strides"].median()
-    sentences.append(
+    yield (
         f"{beat:.0f} of {learners:.0f} robots come to beat it in both joints and stay there"
         + (f", the worlds' median is {median:.0f} strides." if beat else ".")
     )
+
+
+def _range_against_pd(practice: pd.DataFrame) -> Iterator[str]:
+    """The least and the greatest reduction against PD, and in which worlds."""
     for joint in SHOWN:
-        reduced = practice[f"{joint}_reduction"]
+        reduced = practice[f"{joint}_reduction"].dropna()
+        if reduced.empty:
+            continue
         best, least = reduced.idxmax(), reduced.idxmin()
-        sentences.append(
+        yield (
             f"Against PD the {joint}'s mean peak is less by "
-            f"{_percent(practice.loc[least], f'{joint}_reduction')} in {least} to "
-            f"{_percent(practice.loc[best], f'{joint}_reduction')} in {best}."
+            f"{_percent(practice.loc[least], f'{joint}_reduction')} in {least}"
+            + (
+                f" to {_percent(practice.loc[best], f'{joint}_reduction')} in {best}."
+                if len(reduced) > 1
+                else "."
+            )
         )
-    down = table[table["robots"] > table["upright"]]
+
+
+def _where_robots_fell(table: pd.DataFrame) -> str:
+    down = table[table["fell"] > 0]
     places = [
-        f"{row['robots'] - row['upright']:.0f} of {row['robots']:.0f} in {scenario} under "
-        f"{controller}"
+        f"{row['fell']:.0f} of {row['robots']:.0f} in {scenario} under {controller}"
         for (scenario, controller), row in down.iterrows()
     ]
-    sentences.append(f"Robots fell: {', '.join(places)}." if places else "No robot fell.")
-    sentences.append(_control_arm(summary))
+    return f"Robots fell: {', '.join(places)}." if places else "No robot fell."
+
+
+def _joined(*sentences: str) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
+
+
+def answer_in_words(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -> str:
+    """The verdict over one world or all of them, or why the experiment cannot have one.
+
+    Args:
+        summary: See `compare.metrics`.
+        table: Its `answer`, if it is there already.
+    """
+    table = answer(summary) if table is None else table
+    worlds = list(dict.fromkeys(table.index.get_level_values("scenario")))
+    if len(worlds) > 1:
+        said = suite_verdict(summary, table=table)
+    else:
+        said = verdict(summary, scenario=worlds[0], table=table.loc[worlds[0]])
+    return said or _joined(unsaid(table), _where_robots_fell(table))
 
 
 def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
     """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
-    table = overview(summary, scenario=scenario)
+    table = answer(in_family(summary, scenario))
     single = bool((summary["scenario"] == scenario).any())
+    mine = table.loc[scenario]
     parts = [
         _format_beside(beside_the_paper(summary, scenario=scenario)) if single else "",
-        format_overview(table),
-        textwrap.fill(verdict(summary, scenario=scenario, table=table), _WIDTH),
+        beside_note(mine) if single else "",
+        format_overview(mine),
+        textwrap.fill(answer_in_words(in_family(summary, scenario), table=table), _WIDTH),
     ]
     return "\n\n".join(part for part in parts if part)
+
+
+def beside_note(table: pd.DataFrame) -> str:
+    """Who is missing beside the paper's Table I, from an `overview`; empty if nobody is."""
+    mine = table.loc[[name for name in ("pd", LEARNER) if name in table.index]]
+    robots, missing = int(mine["robots"].sum()), int((mine["robots"] - mine["upright"]).sum())
+    if not missing:
+        return ""
+    if missing == robots:
+        return "Nothing stands beside the paper's Table I: no robot stayed up."
+    return (
+        f"Beside the paper's Table I are the robots that stayed up: {missing} of {robots} did not."
+    )
 
 
 def format_suite(summary: pd.DataFrame) -> str:
@@ -216,10 +295,12 @@ def format_suite(summary: pd.DataFrame) -> str:
     parts = []
     for scenario in dict.fromkeys(table.index.get_level_values("scenario")):
         parts.append(f"{scenario}\n{format_overview(table.loc[scenario])}")
-    return "\n\n".join([*parts, textwrap.fill(suite_verdict(summary, table=table), _WIDTH)])
+    return "\n\n".join([*parts, textwrap.fill(answer_in_words(summary, table=table), _WIDTH)])
 
 
 def _format_beside(table: pd.DataFrame) -> str:
+    if table.empty:
+        return ""
     lines = [
         " " * 8 + "".join(f"{f'{joint}: peak stance error [rad]':^44}" for joint in SHOWN),
         f"{'speed':>6}  " + f"{'this run':^22}{'paper, Table I':^22}" * len(SHOWN),
@@ -245,27 +326,40 @@ def format_overview(table: pd.DataFrame) -> str:
         f"{'calf/thigh':>11}  {'beat it':>10}  {'share':>6}  {'transp.':>7}  upright",
     ]
     for name, row in table.iterrows():
-        cells = " ".join(f"{row[joint]:6.4f} {between(row, joint, '.4f'):>16}" for joint in SHOWN)
+        cells = " ".join(
+            f"{number(row[joint], '.4f'):>6} {between(row, joint, '.4f'):>16}" for joint in SHOWN
+        )
         lines.append(
             f"{name:>10}  {cells}  {against_model(row):>11}  {beat_text(row):>10}  "
             f"{number(row['feedback'], '.0%'):>6}  {number(row['cost'], '.2f'):>7}  "
             f"{row['upright']:.0f} of {row['robots']:.0f}"
         )
-    units = sorted(set(table["unit"]))
-    lines.append(f"{'':>10}  intervals over the {'s and '.join(units)}s")
+    if units := units_of_intervals(table):
+        lines.append(f"{'':>10}  intervals over the {units}")
     return "\n".join(lines)
 
 
+def units_of_intervals(table: pd.DataFrame) -> str:
+    """What the intervals of an `overview` are drawn over, in words; empty where there are none."""
+    ends = table[[f"{joint}_low" for joint in SHOWN]]
+    units = sorted(set(table["unit"][ends.notna().any(axis="columns")]))
+    return " and ".join(f"{unit}s" for unit in units)
+
+
 def against_model(row: pd.Series) -> str:
-    """Whether calf and thigh are better than with the model's feedforward: yes, no, or open."""
-    if any(np.isnan(row.get(f"{joint}_model", np.nan)) for joint in SHOWN):
+    """Whether calf and thigh are better than with the model's feedforward: yes, no, or open.
+
+    A dash where no robot stayed up under both, and of practice that nothing taught.
+    """
+    signs = [row.get(f"{joint}_model", np.nan) for joint in SHOWN]
+    if row.get("taught", np.nan) == 0 or np.isnan(signs).any():
         return "-"
     return "/".join({1: "yes", 0: "open", -1: "no"}[int(row[f"{joint}_model"])] for joint in SHOWN)
 
 
 def beat_text(row: pd.Series) -> str:
     """Strides until the model is beaten, and by how many robots; "never" where by none."""
-    if not row["learners"]:
+    if not row["learners"] or row.get("taught", np.nan) == 0:
         return "-"
     if not row["beat"]:
         return "never"

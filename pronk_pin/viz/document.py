@@ -1,4 +1,8 @@
-"""A document of headings, tables and figures, written once and rendered as HTML and Markdown."""
+"""A document of headings, tables and figures, written once and rendered as HTML and Markdown.
+
+Texts are words, not markup, wherever they come from, but for `code` in backticks. Each rendering
+escapes them in one place: `_inline` and `markdown_text`.
+"""
 
 from __future__ import annotations
 
@@ -132,7 +136,8 @@ class Document:
 
     def to_markdown(self, folder: str) -> str:
         """Markdown that shows the figures as files of a folder, see `pictures`."""
-        parts = [f"# {self.title}", *(_markdown(block, folder) for block in self._blocks)]
+        title = f"# {markdown_text(self.title)}"
+        parts = [title, *(_markdown(block, folder) for block in self._blocks)]
         return "\n\n".join(parts) + "\n"
 
     def pictures(self) -> dict[str, bytes]:
@@ -170,29 +175,68 @@ def _html(block: _Heading | _Text | _Bullets | _Table | _Picture) -> str:
     )
 
 
+_CODE = re.compile(r"`([^`]+)`")
+_MARKUP = re.compile(
+    r"""[\\`*_~$\#]     # emphasis, code, formulas, headings
+    | \](?=[(\[])      # links and images
+    | &(?=\#?\w+;)     # entities
+    | <                # HTML""",
+    re.VERBOSE,
+)
+_BEGINS = re.compile(r"\[|>|-(?=-|\s|$)|\+(?=\s|$)|(?<=\d)[.)](?=\s|$)")
+"""Marks that make a line something else where it begins with them, or with them after a number."""
+
+
 def _inline(text: str) -> str:
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
+    return _CODE.sub(r"<code>\1</code>", html.escape(text, quote=False))
+
+
+def markdown_text(text: str, *, cell: bool = False) -> str:
+    """A text as one line of Markdown that shows it as it is; `code` in backticks stays code.
+
+    Args:
+        text: Words, a file's name, an error: whatever it is, it does not become markup.
+        cell: Whether it stands in a table, and not at the beginning of a line.
+    """
+    line = "".join(
+        piece  # in a cell, "|" ends code too, and a backslash before it is shown
+        if _CODE.fullmatch(piece) and not (cell and "|" in piece)
+        else _MARKUP.sub(_escaped, piece)
+        for piece in re.split(r"(`[^`]+`)", " ".join(text.split()))
+    )
+    if cell:
+        return line.replace("|", "\\|")
+    number = re.match(r"\d*", line)
+    at = number.end() if number else 0
+    return f"{line[:at]}\\{line[at:]}" if _BEGINS.match(line, at) else line
+
+
+def _escaped(mark: re.Match[str]) -> str:
+    return "&lt;" if mark[0] == "<" else f"\\{mark[0]}"
 
 
 def _markdown(block: _Heading | _Text | _Bullets | _Table | _Picture, folder: str) -> str:
     if isinstance(block, _Heading):
-        return f'<a id="{block.anchor}"></a>\n\n{"#" * block.level} {block.text}'
+        return f'<a id="{block.anchor}"></a>\n\n{"#" * block.level} {markdown_text(block.text)}'
     if isinstance(block, _Text):
         if block.kind == "code":
             return textwrap.indent(block.text, "    ")
-        return ("> " if block.kind == "verdict" else "") + block.text
+        return ("> " if block.kind == "verdict" else "") + markdown_text(block.text)
     if isinstance(block, _Bullets):
-        return "\n".join(f"- {item}" for item in block.items)
+        return "\n".join(f"- {markdown_text(item)}" for item in block.items)
     if isinstance(block, _Table):
         names = [" ".join(name) if isinstance(name, tuple) else name for name in block.cells]
         rows = [["", *names], *([str(k), *row] for k, row in zip(*_rows(block.cells), strict=True))]
         lines = [
-            "| " + " | ".join(str(cell).replace("|", "\\|") for cell in row) + " |" for row in rows
+            "| " + " | ".join(markdown_text(str(cell), cell=True) for cell in row) + " |"
+            for row in rows
         ]
         align = ":--" if block.left else "--:"
         lines.insert(1, "|" + "|".join([":--", *([align] * len(names))]) + "|")
         return "\n".join(lines)
-    return f"![{block.caption}]({folder}/{block.name}.svg)\n\n{block.caption}"
+    caption = markdown_text(block.caption)
+    alt = block.caption.replace("[", "(").replace("]", ")")
+    return f"![{markdown_text(alt)}]({folder}/{block.name}.svg)\n\n{caption}"
 
 
 def _rows(cells: pd.DataFrame) -> tuple[list[object], list[list[object]]]:

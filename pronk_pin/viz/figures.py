@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from .._typing import Array, IntArray
 from ..compare.metrics import by_joint, steady
 from ..compare.paper import table_1
+from ..compare.statistics import robots
 from ..compare.tables import SHOWN
 from .style import (
     ACCENT,
@@ -26,6 +27,7 @@ from .style import (
     legend_below,
     look,
     new_figure,
+    say,
     styled,
 )
 
@@ -38,6 +40,13 @@ _LEG = "FL"  # the leg that the paper shows
 def stance(strides: xr.Dataset, name: str) -> xr.DataArray:
     """A curve of the stance: (speed, stride, phase, joint), or without what it does not have."""
     return strides[name].sel(part="stance")
+
+
+def stayed_up(strides: xr.Dataset) -> xr.Dataset:
+    """The strides of the robots that never fell, and finished some."""
+    upright = strides["upright"].transpose("speed", "stride").to_numpy()
+    finished = strides["count"].to_numpy() > 0
+    return strides.isel(speed=np.flatnonzero(finished & ~(upright == 0).any(axis=1)))
 
 
 @styled
@@ -68,6 +77,8 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
         time.set_ylabel(f"{joint}, {_LEG} [rad]")
         first: Axes | None = None
         for column, (name, stride) in enumerate((("pd", switch - 1), ("ilc", count - 1))):
+            if stride < 0:
+                continue  # nothing before the learning
             first = figure.add_subplot(grid[row, 2 + column], sharey=first)
             _one_stance(first, mine, f"{_LEG}_{joint}", stride, name)
             if row == 1:
@@ -170,8 +181,11 @@ def _by_speed(torque: xr.DataArray, phase: Array, label: str) -> Figure:
 
 @styled
 def errors_by_speed(summary: pd.DataFrame, *, scenario: str) -> Figure:
-    """Peak stance error over the speed, for every controller, with the paper's Table I."""
-    rows = summary[(summary["metric"] == "peak_error") & (summary["scenario"] == scenario)]
+    """Peak stance error over the speed, for every controller, with the paper's Table I.
+
+    Means over the robots that stayed up.
+    """
+    shown = in_order(summary[summary["scenario"] == scenario]["controller"].unique())
     figure = new_figure(TWO_COLUMNS, 2.9)
     panels = figure.subplots(1, 2)
     for axes, joint in zip(panels, SHOWN, strict=True):
@@ -182,11 +196,11 @@ def errors_by_speed(summary: pd.DataFrame, *, scenario: str) -> Figure:
             axes.plot(
                 paper["speed"], paper["value"], marker, color=look("paper").color, label=label
             )
-        for controller in in_order(rows["controller"].unique()):
-            mine = rows[(rows["joint"] == joint) & (rows["controller"] == controller)]
-            mean = mine.groupby("speed")["value"].mean()
-            style = look(controller)
-            axes.plot(mean.index, mean, marker=style.marker, **style.curve)
+        for controller in shown:
+            peaks = robots(summary, scenario=scenario, controller=controller, joint=joint)
+            mean, style = peaks.mean().dropna(), look(controller)
+            if len(mean):
+                axes.plot(mean.index, mean, marker=style.marker, **style.curve)
         axes.set_title(joint)
         axes.set_xlabel("speed [m/s]")
         axes.set_ylabel("peak stance error [rad]")
@@ -200,8 +214,10 @@ def learning_curves(strides: Mapping[str, xr.Dataset]) -> Figure:
     """Peak error over the strides of learning, with the levels of those that do not learn.
 
     Args:
-        strides: The strides by controller.
+        strides: The strides by controller; of robots that fell nothing is drawn.
     """
+    strides = {name: stayed_up(those) for name, those in strides.items()}
+    strides = {name: those for name, those in strides.items() if those.sizes["speed"]}
     figure = new_figure(TWO_COLUMNS, 2.7)
     panels = figure.subplots(1, 2)
     for axes, joint in zip(panels, SHOWN, strict=True):
@@ -216,6 +232,8 @@ def learning_curves(strides: Mapping[str, xr.Dataset]) -> Figure:
             k = np.arange(-2, curves.shape[1] - 2)
             axes.plot(k, np.mean(curves, axis=0), **style.curve)
             axes.fill_between(k, curves.min(0), curves.max(0), color=style.color, alpha=0.2, lw=0)
+        if not strides:
+            say(axes, "no robot stayed up")
         axes.set_title(f"{joint}: mean and range over the speeds")
         axes.set_xlabel("strides since the learning was switched on")
         axes.set_ylabel("peak stance error [rad]")
@@ -226,7 +244,8 @@ def learning_curves(strides: Mapping[str, xr.Dataset]) -> Figure:
 
 def _learning(strides: xr.Dataset, joint: str, length: int = 27) -> Array | None:
     """Peak errors from two strides before the switch on, (speeds, strides); None without one."""
-    if not bool((strides["learning"] == 1).any()):
+    strides = strides.isel(speed=np.flatnonzero((strides["learning"] == 1).any("stride")))
+    if not strides.sizes["speed"]:
         return None
     peak = by_joint(strides["peak_error"]).sel(joint=joint).to_numpy()
     first = np.argmax(strides["learning"].to_numpy() == 1, axis=1)

@@ -9,9 +9,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from ..compare.prediction import Prediction
+from ..compare.seeding import stayed_up
 from ..compare.tables import SHOWN
 from ..robot import JOINTS
-from .style import PALETTE, TWO_COLUMNS, in_order, legend_below, look, new_figure, styled
+from .style import PALETTE, TWO_COLUMNS, in_order, legend_below, look, new_figure, say, styled
 
 _COLORS = dict(zip(SHOWN, (PALETTE["blue"], PALETTE["vermilion"]), strict=True))
 
@@ -47,6 +48,7 @@ def errors_by_seed(table: pd.DataFrame) -> Figure:
     Args:
         table: What `compare.seeding.measure_seeding` returns.
     """
+    table = stayed_up(table)
     figure = new_figure(TWO_COLUMNS, 3.0)
     panels = figure.subplots(1, len(SHOWN), sharey=True)
     for axes, joint in zip(panels, SHOWN, strict=True):
@@ -56,6 +58,8 @@ def errors_by_seed(table: pd.DataFrame) -> Figure:
             axes.semilogy(middle.index, middle, **style.curve)
             low, high = errors.min(), errors.max()
             axes.fill_between(middle.index, low, high, color=style.color, alpha=0.15, lw=0)
+        if table.empty:
+            say(axes, "no robot stayed up")
         axes.set_title(joint)
         axes.set_xlabel("strides of learning")
     panels[0].set_ylabel("peak stance error [rad]")

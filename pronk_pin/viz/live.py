@@ -7,6 +7,9 @@ tornado, which comes with MeshCat, gives both: on a thread of this process, whic
 The page asks for the film of what it is to show, and plays it by the clock of its own machine:
 each page is paused and scrubbed for itself, and is in real time however busy this process is. A
 loop that has no film yet, because it is computing it, sends instants instead.
+
+Requests that name another host than the page's, and pages of another origin, are refused; see
+`hosts`.
 """
 
 from __future__ import annotations
@@ -29,10 +32,12 @@ import tornado.httpserver
 import tornado.netutil
 import tornado.web
 import tornado.websocket
+from tornado.httputil import HTTPServerRequest
 
 from .._state import as_array, as_q
 from ..errors import InvalidInput, PortUnavailable, PronkError
 from .documents import film_blob, robot_blob, row_bytes, stream_row
+from .hosts import Hosts, url_of
 from .page import page, player_source, viewer_source
 from .programme import Programme
 from .scene import CHANNELS, Scene
@@ -83,7 +88,8 @@ def serve(
     Args:
         shown: What to show.
         port: Port of the page; without it a free one is found.
-        host: Address to listen on; the default can be reached from this machine only.
+        host: Address to listen on; the default can be reached from this machine only. The page
+            answers to this host, and to what else `hosts.Hosts` lists.
         open_browser: Open the page in the default browser.
         duration: End after this time [s] instead of waiting for Ctrl-C.
 
@@ -114,6 +120,7 @@ class LiveServer:
         programme: What can be shown.
         scene: What is shown first, and what `display` moves.
         url: Address of the page.
+        hosts: What it answers to.
     """
 
     def __init__(
@@ -123,7 +130,8 @@ class LiveServer:
         self.scene = self.programme.scene()
         self._robot = robot_blob(self.scene)
         self._sockets = _bind(host, port)
-        self.url = f"http://{host}:{self._sockets[0].getsockname()[1]}/"
+        self.hosts = Hosts.of(host, self._sockets)
+        self.url = url_of(host, self.hosts.port)
         self._pages: set[_Stream] = set()
         self._last: bytes | None = None
         self._view = self.scene.view(np.array([self.scene.start]))[0]
@@ -236,7 +244,7 @@ class LiveServer:
             ("/film", _Film, {"server": self}),
             ("/stream", _Stream, {"pages": self._pages, "server": self}),
         ]
-        return tornado.web.Application(served, log_function=lambda handler: None)
+        return _Application(self, served, log_function=lambda handler: None)
 
     async def film(self, choice: dict[str, str]) -> bytes:
         """The film of a choice; films are made one after the other, aside from the pages."""
@@ -246,6 +254,43 @@ class LiveServer:
     def _film(self, choice: dict[str, str]) -> bytes:
         first = choice == dict(self.programme.first)
         return film_blob(self.scene if first else self.programme.scene(choice))
+
+
+class _Application(tornado.web.Application):
+    """Answers to the hosts of the page only, whatever is asked for."""
+
+    def __init__(self, server: LiveServer, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self._server = server
+
+    def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> Any:
+        """Who answers a request: for another host, or a page of another origin, the refusal."""
+        hosts, arrived_at = self._server.hosts, _arrived_at(request)
+        host, origin = (request.headers.get(name) for name in ("Host", "Origin"))
+        if not hosts.answers(host, arrived_at=arrived_at):
+            refused = f"the host {host!r}"
+        elif origin is not None and not hosts.trusts(origin, arrived_at=arrived_at):
+            refused = f"pages of {origin!r}"
+        else:
+            return super().find_handler(request, **kwargs)
+        return self.get_handler_delegate(
+            request, _Refusal, {"refused": refused, "url": self._server.url}
+        )
+
+
+class _Refusal(tornado.web.RequestHandler):
+    """Answers nothing but that it does not."""
+
+    def initialize(self, refused: str, url: str) -> None:
+        self._refused, self._url = refused, url
+
+    def prepare(self) -> None:
+        self.set_status(403)
+        self.set_header("Content-Type", "text/plain; charset=utf-8")
+        self.finish(
+            f"This page does not answer to {self._refused}. Open {self._url}, or give the name "
+            "that it is to answer to with --host.\n"
+        )
 
 
 class _Bytes(tornado.web.RequestHandler):
@@ -281,12 +326,16 @@ class _Film(tornado.web.RequestHandler):
 
 
 class _Stream(tornado.websocket.WebSocketHandler):
-    """The connection to one open page; tornado refuses pages of other origins."""
+    """The connection to one open page; pages of other origins are refused."""
 
     def initialize(self, pages: set[_Stream], server: LiveServer) -> None:
         self._pages, self._server = pages, server
         self._waiting: bytes | None = None
         self._sending: asyncio.Task[None] | None = None
+
+    def check_origin(self, origin: str) -> bool:
+        """Whether a page of that origin may listen."""
+        return self._server.hosts.trusts(origin, arrived_at=_arrived_at(self.request))
 
     def open(self, *args: str, **kwargs: str) -> None:
         self.set_nodelay(True)
@@ -311,6 +360,15 @@ class _Stream(tornado.websocket.WebSocketHandler):
             while self._waiting is not None:
                 row, self._waiting = self._waiting, None
                 await self.write_message(row, binary=True)
+
+
+def _arrived_at(request: HTTPServerRequest) -> str:
+    """Address of this machine that a request has arrived at; empty once its page has gone."""
+    stream = getattr(request.connection, "stream", None)
+    try:
+        return str(stream.socket.getsockname()[0]) if stream is not None else ""
+    except (OSError, AttributeError):
+        return ""
 
 
 def _text(text: str, kind: str) -> dict[str, Any]:

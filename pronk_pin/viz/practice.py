@@ -68,12 +68,14 @@ def practice_programme(
     speeds, controllers = list(experiment.speeds), list(experiment.controllers)
     if controller is None:
         controller = "ilc" if "ilc" in controllers else controllers[0]
-    wanted = SHOWN_SPEED if speed is None else speed
-    at = int(np.argmin(np.abs(np.asarray(speeds) - wanted)))
+    scenario = experiment.scenarios[0] if scenario is None else scenario
+    strides = results.all_strides(controller=controller, scenario=scenario)
+    windows = _windows(strides)
     if speed is not None:
         at = nearest(speeds, speed, "speed")
-    scenario = experiment.scenarios[0] if scenario is None else scenario
-    windows = _windows(results.all_strides(controller=controller, scenario=scenario))
+    else:  # of those that have something to show
+        distance = np.abs(np.asarray(speeds) - SHOWN_SPEED)
+        at = int(np.argmin(np.where(strides["count"] > 0, distance, np.inf)))
     reader = _Reader(results)
     first = {
         SPEED: f"{speeds[at]:g}",
@@ -125,6 +127,7 @@ class _Reader:
         learned = shown["start"].to_numpy()[shown["learning"].to_numpy() == 1]
         began = float(learned[0] - shown["start"][0]) if learned.size else 0.0
         note = f"; learning starts after {began:.1f} s" if began > 0.0 else ""
+        note += "; the robot fell" if bool((shown["upright"] == 0).any()) else ""
         return Scene(
             robot,
             tracks,

@@ -37,7 +37,8 @@ _START = """\
 def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS) -> Path:
     """Write a scene, or several to choose from, as one HTML file that plays at once and repeats.
 
-    Of a programme the file holds `Programme.choices`, as far as it stays below `LARGEST`.
+    Of a programme the file holds `Programme.choices`, as far as it stays below `LARGEST`; without
+    those of which there is nothing to show.
 
     The page has the controls of the live page; with `#t=0.35` behind its address it opens paused
     0.35 s after the scene's beginning.
@@ -79,7 +80,13 @@ def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
     held: list[Choice] = []
     size = len(frame.encode()) + len(robot) + 2_000
     for choice in programme.choices():
-        text = _text(film_blob(programme.scene(choice), fps=fps))
+        try:
+            scene = programme.scene(choice)
+        except InvalidInput:
+            if not films:
+                raise
+            continue  # as strides before the learning of who learned from the first on
+        text = _text(film_blob(scene, fps=fps))
         if films and size + len(text) > LARGEST:
             break
         size += len(text) + 100

@@ -9,19 +9,22 @@ import shlex
 import textwrap
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+import xarray as xr
 from matplotlib.figure import Figure
 
 from ..compare import ForeignRobot, Results
 from ..compare.limits import limitations
-from ..compare.practice import VARIABLES, Practice, practice
+from ..compare.practice import LEARNER, VARIABLES, Practice, practice
 from ..compare.statistics import CONFIDENCE, LEAST_UNITS, family, sampled
 from ..compare.suites import SUITES, load_suite
 from ..compare.tables import SHOWN, answer, beside_the_paper, sampled_worlds
 from ..compare.words import (
-    LEARNER,
+    answer_in_words,
+    beside_note,
     families,
-    suite_verdict,
+    units_of_intervals,
     verdict,
 )
 from ..errors import cannot_write
@@ -87,11 +90,9 @@ def report(results: Results) -> Document:
     summary, worlds = results.summary(), families(results.experiment.scenarios)
     document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
     table = answer(summary)
+    document.text(answer_in_words(summary, table=table), "verdict")
     if len(worlds) > 1:
-        document.text(suite_verdict(summary, table=table), "verdict")
         _all_worlds(document, results, table)
-    else:
-        document.text(verdict(summary, scenario=worlds[0], table=table.loc[worlds[0]]), "verdict")
     for world in worlds:
         _world(document, results, summary, table, world)
     if results.foreign is not None:
@@ -126,7 +127,10 @@ def command(results: Results) -> str:
 
 
 def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
-    """The report's figures about one scenario, by name; those of learning only where `ilc` ran."""
+    """The report's figures about one scenario, by name.
+
+    Those of what was learned only where `ilc` ran, and a robot that it taught something stayed up.
+    """
     controllers = dict.fromkeys(cell.controller for cell in reversed(results.experiment.cells()))
     strides = {
         name: results.all_strides(controller=name, scenario=scenario) for name in controllers
@@ -135,15 +139,22 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
         "errors": figures.errors_by_speed(results.summary(), scenario=scenario),
         "learning": figures.learning_curves(strides),
     }
-    if LEARNER in strides:
-        speed = min(results.experiment.speeds, key=lambda v: abs(v - SHOWN_SPEED))
-        learned = strides[LEARNER]
+    learned = _learned(strides[LEARNER]) if LEARNER in strides else None
+    if learned is not None and learned.sizes["speed"]:
+        speed = min(learned["speed"].to_numpy(), key=lambda v: abs(v - SHOWN_SPEED))
         found["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
         found["torques"] = figures.torque_library(learned)
         found["surface"] = figures.torque_surface(learned)
-        if "model" in strides:
-            found["difference"] = figures.learned_minus_model(learned, strides["model"])
+        model = figures.stayed_up(strides["model"]) if "model" in strides else None
+        if model is not None and set(model["speed"].values) & set(learned["speed"].values):
+            found["difference"] = figures.learned_minus_model(learned, model)
     return found
+
+
+def _learned(strides: xr.Dataset) -> xr.Dataset:
+    """The strides of the robots that stayed up and learned something."""
+    taught = (strides["learning"] == 1) & (strides["skipped"] == 0)
+    return figures.stayed_up(strides.isel(speed=np.flatnonzero(taught.any("stride"))))
 
 
 def write_figures(results: Results, folder: Path) -> list[Path]:
@@ -219,8 +230,8 @@ def _world(
         document.text(verdict(summary, scenario=world, table=table.loc[world]))
     document.table(report_tables.errors(table.loc[world]))
     document.table(report_tables.motion(table.loc[world]))
-    units = sorted(set(table.loc[world]["unit"]))
-    document.text(f"Intervals are drawn over the {' and '.join(units)}s.", "note")
+    units = units_of_intervals(table.loc[world])
+    document.text(f"Intervals are drawn over the {units}." if units else "", "note")
     if sampled(world):
         _sampled(document, results, summary, world)
     if world != worlds[0] or world not in results.experiment.scenarios:
@@ -230,17 +241,27 @@ def _world(
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
     if {"pd", LEARNER} <= set(results.experiment.controllers):
         document.heading("Table I, beside the paper's", f"{world}-table", level=3)
-        document.table(report_tables.table_1(beside_the_paper(summary, scenario=world)))
-        document.text(
-            "The last row holds the means of the peaks, and the reduction of the mean (the paper "
-            "prints the mean of its reductions: 75.8 % and 30.8 %).",
-            "note",
-        )
-    if "tracking" in found:
+        _beside(document, beside_the_paper(summary, scenario=world), table.loc[world])
+    if LEARNER in results.experiment.controllers:
         document.heading("Before and after, and what was learned", f"{world}-learned", level=3)
+        if "tracking" not in found:
+            document.text("Nothing to show: no robot stayed up that practice taught something.")
         for name in ("tracking", "torques", "surface", "difference"):
             if name in found:
                 document.picture(name, found[name], _CAPTIONS[name])
+
+
+def _beside(document: Document, beside: pd.DataFrame, table: pd.DataFrame) -> None:
+    """Our errors beside the paper's Table I, and who is missing there."""
+    document.text(beside_note(table), "note")
+    if beside.empty:
+        return
+    document.table(report_tables.table_1(beside))
+    document.text(
+        "The last row holds the means of the peaks, and the reduction of the mean (the paper "
+        "prints the mean of its reductions: 75.8 % and 30.8 %).",
+        "note",
+    )
 
 
 def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
@@ -299,19 +320,25 @@ def _sampled(document: Document, results: Results, summary: pd.DataFrame, world:
 
 def _provenance(document: Document, results: Results) -> None:
     document.heading("Where these numbers come from", "provenance")
-    document.text("Made again, to the bit with the same versions, by")
+    document.text(
+        "Made again by this command, to the bit with the same versions, the same BLAS kernel and a "
+        "processor of the same family:"
+    )
     lines = textwrap.wrap(command(results), 96, break_long_words=False, break_on_hyphens=False)
     document.text(" \\\n    ".join(lines), "code")
     document.text(
-        "Every number stands in `summary.csv`, every stride in `strides/`, who made them and when "
-        "in `provenance.json`."
+        "Every number stands in `summary.csv`, every stride in `strides/`, when they were made and "
+        "how long it took in `provenance.json`."
     )
-    runs = results.provenance["runs"]
-    for k, run in enumerate(runs):
-        if len(runs) > 1:
-            document.heading(f"Run {k + 1} of {len(runs)}", f"run-{k + 1}", level=3)
-        rows = pd.DataFrame.from_dict(report_tables.provenance(run), orient="index", columns=[""])
-        document.table(rows, left=True)
+    # However often the run was interrupted: each machine, commit and set of versions once.
+    made: list[dict[str, str]] = []
+    for run in results.provenance["runs"]:
+        found = report_tables.provenance(run)
+        made += [found] if found not in made else []
+    for k, found in enumerate(made, start=1):
+        if len(made) > 1:
+            document.heading(f"Made with, {k} of {len(made)}", f"run-{k}", level=3)
+        document.table(pd.DataFrame.from_dict(found, orient="index", columns=[""]), left=True)
     seeds = ", ".join(map(str, results.experiment.seeds))
     if results.foreign is not None:
         document.text(

@@ -7,9 +7,9 @@ from typing import Any
 
 import pandas as pd
 
-from ..compare.practice import RIVAL
+from ..compare.practice import LEARNER, RIVAL
 from ..compare.tables import SHOWN, WORLD
-from ..compare.words import LEARNER, against_model, beat_text, between, number
+from ..compare.words import against_model, beat_text, between, number
 from ..parity import Parity, Row, format_value, merged
 from .figures import LABELS
 from .style import in_order
@@ -134,16 +134,11 @@ def table_1(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def provenance(run: dict[str, Any]) -> dict[str, str]:
-    """Who made a result, when and with what: a run of `Results.provenance`."""
-    cells = run.get("cells", {})
-    simulated = sum(times["simulation_s"] for times in cells.values())
-    encoded = sum(times["encoding_s"] for times in cells.values())
-    wall = f"{run['wall_time_s']:g} s" if "wall_time_s" in run else "not finished"
+    """What a result was made with: a run of `Results.provenance`.
+
+    When, how fast and by how many workers is not in it: the report is the same each time.
+    """
     return {
-        "began": run["started"],
-        "wall time": f"{wall}; {len(cells)} cells, {simulated:.0f} s simulating and "
-        f"{encoded:.0f} s packing their files; summary {run.get('summary_s', float('nan')):g} s",
-        "by": run["executor"],
         "versions": ", ".join(f"{name} {version}" for name, version in run["versions"].items()),
         "source": run["git"] or "not under version control",
         "Python": run["python"],

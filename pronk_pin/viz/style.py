@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..errors import InvalidInput, cannot_write
@@ -164,10 +165,17 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def legend_below(figure: Figure, handles: Iterable[Any], labels: Iterable[str]) -> None:
-    """One legend for all panels, under them."""
+    """One legend for all panels, under them; none where there is nothing to name."""
     shown = list(labels)
+    if not shown:
+        return
     columns = min(len(shown), 4)
     figure.legend(list(handles), shown, loc="outside lower center", ncols=columns)
+
+
+def say(axes: Axes, words: str) -> None:
+    """Say in a panel why it is empty."""
+    axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", color="0.4")
 
 
 def figure_bytes(figure: Figure, suffix: str) -> bytes:

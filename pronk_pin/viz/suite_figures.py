@@ -20,6 +20,7 @@ from .style import (
     legend_below,
     look,
     new_figure,
+    say,
     styled,
 )
 
@@ -34,14 +35,16 @@ def heat_map(table: pd.DataFrame) -> Figure:
     """Mean peak error of every controller in every world, one panel a joint.
 
     Args:
-        table: `compare.tables.answer`. Where robots fell, their number stands below the error.
+        table: `compare.tables.answer`. Where robots fell, their number stands below the error, or
+            instead of it.
     """
     scenarios = list(dict.fromkeys(table.index.get_level_values("scenario")))
     controllers = in_order(table.index.get_level_values("controller"))
     figure = new_figure(TWO_COLUMNS, 1.1 + 0.27 * len(scenarios))
     panels = figure.subplots(1, len(SHOWN), sharey=True)
     errors = table[list(SHOWN)].to_numpy(dtype=float)
-    norm = LogNorm(np.nanmin(errors), np.nanmax(errors))
+    errors = errors[np.isfinite(errors)]
+    norm = LogNorm(errors.min(), errors.max()) if errors.size else LogNorm(1e-3, 1.0)
     for axes, joint in zip(panels, SHOWN, strict=True):
         values = table[joint].unstack("controller").reindex(index=scenarios, columns=controllers)
         image = axes.imshow(values, cmap=SEQUENTIAL, norm=norm, aspect="auto")
@@ -64,14 +67,18 @@ def _write_cells(axes: Axes, table: pd.DataFrame, values: pd.DataFrame, norm: Lo
     for (row, column), value in np.ndenumerate(values.to_numpy(dtype=float)):
         key = (values.index[row], values.columns[column])
         if not np.isfinite(value):
-            text = "all\nfell" if key in table.index else ""
+            text = _why_empty(table.loc[key]) if key in table.index else ""
             axes.text(column, row, text, ha="center", va="center", fontsize=6)
             continue
-        fallen = int(table.loc[key, "robots"] - table.loc[key, "upright"])
+        fallen = int(table.loc[key, "fell"])
         text = f"{1e3 * value:.0f}" + (f"\n{fallen} fell" if fallen else "")
         light = np.dot(colormaps[SEQUENTIAL](float(norm(value)))[:3], (0.3, 0.6, 0.1)) > 0.5
         color = "black" if light else "white"
         axes.text(column, row, text, ha="center", va="center", fontsize=6, color=color)
+
+
+def _why_empty(row: pd.Series) -> str:
+    return "all\nfell" if row["fell"] == row["robots"] else "no\nstride"
 
 
 @styled
@@ -98,7 +105,10 @@ def practice_curves(practised: Mapping[str, list[Practice]], *, joint: str) -> F
             if line is not None:
                 handles[look(controller).label] = line
         axes.set_title(scenario)
-        axes.set_yscale("log")
+        if axes.lines:
+            axes.set_yscale("log")
+        else:
+            say(axes, "no robot stayed up")
     for axes in panels[-1]:
         axes.set_xlabel("strides of learning")
     for axes in panels[:, 0]:
@@ -124,7 +134,10 @@ def by_world(table: pd.DataFrame) -> Figure:
         for controller in controllers:
             style = look(controller)
             axes.plot(errors[controller], rows, style.marker, color=style.color, label=style.label)
-        axes.set_xscale("log")
+        if np.isfinite(errors.to_numpy(dtype=float)).any():
+            axes.set_xscale("log")
+        else:
+            say(axes, "no robot stayed up")
         axes.set_title(joint)
         axes.set_xlabel("mean peak stance error [rad]")
     panels[0].set_yticks(rows, table.index)

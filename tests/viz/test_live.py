@@ -24,6 +24,7 @@ from pronk_pin.errors import InvalidInput, PortUnavailable, PronkError
 from pronk_pin.viz import Programme, Scene, Track, serve
 from pronk_pin.viz.browser import Browser
 from pronk_pin.viz.documents import film_blob, robot_blob
+from pronk_pin.viz.hosts import Hosts
 from pronk_pin.viz.live import LiveServer
 
 if TYPE_CHECKING:
@@ -143,6 +144,137 @@ def test_only_this_machine_can_reach_it(scene: Scene) -> None:
         assert listens("127.0.0.1", port_of(server.url))
         # A server on all interfaces would answer on the whole of 127.0.0.0/8.
         assert not listens("127.0.0.2", port_of(server.url))
+
+
+PATHS = ("/", "/viewer.js", "/player.js", "/robot", "/film", "/stream", "/elsewhere")
+
+
+def ask(address: str, port: int, head: str) -> str:
+    """What a server answers to the lines of a request, byte for byte as they are given."""
+    with socket.create_connection((address, port), timeout=20) as connection:
+        connection.sendall(f"{head}\r\nConnection: close\r\n\r\n".encode())
+        answer = b""
+        while part := connection.recv(1 << 16):
+            answer += part
+    return answer.decode("utf-8", "replace")
+
+
+def status(answer: str) -> int:
+    return int(answer.split()[1])
+
+
+def upgrade(origin: str, host: str) -> str:
+    """A browser's request for the stream."""
+    return (
+        f"GET /stream HTTP/1.1\r\nHost: {host}\r\nOrigin: {origin}\r\nUpgrade: websocket\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="
+    )
+
+
+def handshake(address: str, port: int, origin: str, host: str) -> int:
+    """Status of the answer to a browser's request for the stream."""
+    with socket.create_connection((address, port), timeout=20) as connection:
+        connection.sendall(f"{upgrade(origin, host)}\r\nConnection: Upgrade\r\n\r\n".encode())
+        return status(connection.recv(1 << 12).decode("utf-8", "replace"))
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("host", ["rebound.example", "127.0.0.1.rebound.example", "127.0.0.2"])
+def test_a_name_that_was_rebound_to_this_machine_reads_nothing(
+    scene: Scene, path: str, host: str
+) -> None:
+    with LiveServer(scene) as server:
+        port = port_of(server.url)
+        answer = ask("127.0.0.1", port, f"GET {path} HTTP/1.1\r\nHost: {host}:{port}")
+        posted = ask("127.0.0.1", port, f"POST {path} HTTP/1.1\r\nHost: {host}:{port}")
+    assert status(answer) == status(posted) == 403
+    assert f"does not answer to the host '{host}:{port}'. Open {server.url}" in answer
+    assert "text/plain" in answer
+    assert len(answer) < 1000
+
+
+def test_this_machines_own_names_are_answered_at_the_right_port(scene: Scene) -> None:
+    with LiveServer(scene) as server:
+        port = port_of(server.url)
+
+        def get_as(host: str) -> int:
+            return status(ask("127.0.0.1", port, f"GET / HTTP/1.1\r\nHost: {host}"))
+
+        for name in ("127.0.0.1", "localhost", "LOCALHOST", "localhost.", "[::1]"):
+            assert get_as(f"{name}:{port}") == 200, name
+            assert get_as(name) == 200, name
+            assert get_as(f"{name}:{port + 1}") == 403, name
+        for name in ("::1", "localhost:", "[localhost", "127.0.0.1:7000:7000", "a@localhost"):
+            assert get_as(name) in (400, 403), name
+        assert get_as(f"localhost:{port}\r\nHost: rebound.example:{port}") in (400, 403)
+        assert status(ask("127.0.0.1", port, "GET / HTTP/1.0")) == 403  # names nobody
+
+
+def test_the_stream_is_for_pages_of_the_same_hosts_only(scene: Scene) -> None:
+    with LiveServer(scene) as server:
+        port = port_of(server.url)
+        own = f"127.0.0.1:{port}"
+        for origin in (f"http://{own}", f"http://localhost:{port}", f"http://[::1]:{port}"):
+            assert handshake("127.0.0.1", port, origin, own) == 101, origin
+        for origin in (
+            f"http://rebound.example:{port}",
+            "http://localhost",  # another server of this machine
+            f"http://localhost:{port + 1}",
+            "null",
+            "http://[",
+        ):
+            assert handshake("127.0.0.1", port, origin, own) == 403, origin
+        rebound = f"rebound.example:{port}"
+        assert handshake("127.0.0.1", port, f"http://{rebound}", rebound) == 403
+
+
+def test_a_page_of_ipv6_has_an_address_that_can_be_opened(scene: Scene) -> None:
+    try:
+        server = LiveServer(scene, host="::1")
+    except PortUnavailable:
+        pytest.skip("this machine has no IPv6")
+    with server:
+        port = port_of(server.url)
+        assert server.url == f"http://[::1]:{port}/"
+        assert "MeshCat" in get(f"{server.url}viewer.js").decode()
+        for host, code in (("[0:0:0:0:0:0:0:1]", 200), ("localhost", 200), ("[::2]", 403)):
+            answer = ask("::1", port, f"GET / HTTP/1.1\r\nHost: {host}:{port}")
+            assert status(answer) == code, host
+
+
+def test_a_page_for_other_machines_answers_to_this_machines_names(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(socket, "gethostname", lambda: "Lab7")
+    monkeypatch.setattr(socket, "getfqdn", lambda: "lab7.uni.example")
+    with LiveServer(scene, host="0.0.0.0") as server:
+        port = port_of(server.url)
+        for host in ("lab7", "lab7.uni.example", "127.0.0.2", "localhost", "0.0.0.0"):
+            answer = ask("127.0.0.2", port, f"GET / HTTP/1.1\r\nHost: {host}:{port}")
+            assert status(answer) == 200, host
+            assert handshake("127.0.0.2", port, f"http://{host}:{port}", f"{host}:{port}") == 101
+        for host in ("rebound.example", "lab7.rebound.example", "127.0.0.3", "10.0.0.1"):
+            answer = ask("127.0.0.2", port, f"GET / HTTP/1.1\r\nHost: {host}:{port}")
+            assert status(answer) == 403, host
+            origin = f"http://{host}:{port}"
+            assert handshake("127.0.0.2", port, origin, f"127.0.0.2:{port}") == 403, host
+
+
+def test_a_page_at_one_other_address_answers_to_that_and_the_machines_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(socket, "gethostname", lambda: "lab7")
+    monkeypatch.setattr(socket, "getfqdn", lambda: "lab7.uni.example")
+
+    class Listening:
+        def getsockname(self) -> tuple[str, int]:
+            return "192.168.1.5", 7000
+
+    hosts = Hosts.of("robots.uni.example", [Listening()])  # type: ignore[list-item]
+    for host in ("robots.uni.example", "192.168.1.5", "lab7", "lab7.uni.example"):
+        assert hosts.answers(f"{host}:7000")
+    for host in ("localhost", "127.0.0.1", "192.168.1.6", "rebound.example"):
+        assert not hosts.answers(f"{host}:7000")
 
 
 def test_a_port_in_use_is_refused_with_a_remedy(scene: Scene) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -84,6 +87,41 @@ def test_the_same_result_gives_the_same_report(result: Results, tmp_path: Path) 
     write_report(copy)
     for name in ("report.html", "report.md"):
         assert (copy.folder / name).read_bytes() == (result.folder / name).read_bytes()
+
+
+def test_the_report_is_the_same_whenever_and_by_however_many_workers_it_is_made(
+    result: Results, tmp_path: Path
+) -> None:
+    """Another process, with other hashes, at another time; the run was interrupted meanwhile."""
+    folder = shutil.copytree(result.folder, tmp_path / "copy")
+    copy = Results(folder, result.experiment)
+    (run,) = copy.provenance["runs"]
+    other = {**run, "started": "2001-02-03T04:05:06+00:00", "executor": "7 others"}
+    other |= {"wall_time_s": 12345.6, "summary_s": 78.9}
+    copy.write_provenance({"finished": True, "runs": [{**other, "cells": {}}, other]})
+    for path in [folder / "report.html", folder / "report.md", *folder.glob("figures/*")]:
+        path.unlink()
+    program = (
+        "import sys; from pronk_pin.compare import Results; "
+        "from pronk_pin.viz.report import write_report; write_report(Results.load(sys.argv[1]))"
+    )
+    environment = {**os.environ, "PYTHONHASHSEED": "7", "TZ": "Pacific/Auckland"}
+    subprocess.run([sys.executable, "-c", program, folder], env=environment, check=True)
+    made = [path.relative_to(result.folder) for path in result.folder.glob("figures/*.svg")]
+    assert len(made) >= 8
+    for name in ("report.html", "report.md", *made):
+        assert (folder / name).read_bytes() == (result.folder / name).read_bytes(), name
+
+
+def test_the_report_tells_no_time(result: Results) -> None:
+    (run,) = result.provenance["runs"]
+    texts = [(result.folder / name).read_text() for name in ("report.html", "report.md")]
+    texts += [path.read_text() for path in result.folder.glob("figures/*.svg")]
+    for text in texts:
+        for told in (run["started"], run["started"][:10], "wall time", "dc:date"):
+            assert told not in text
+    for kept in (run["versions"]["mujoco"], run["cpu"]):
+        assert kept in texts[0]
 
 
 def test_the_command_makes_the_same_experiment_again(
