@@ -10,11 +10,12 @@ with the rotors' inertia A, viscous friction D, Coulomb friction C and the torqu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
+from ._checks import ANY, NOT_NEGATIVE, POSITIVE, real, reals
 from ._typing import Array, IntArray
 from .errors import InvalidInput
 
@@ -49,20 +50,13 @@ class ModelParameters:
     torque_constant: float = 1.0
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = np.asarray(getattr(self, item.name), dtype=float)
-            if not np.all(np.isfinite(value)):
-                raise InvalidInput(f"{item.name} is not finite; give numbers")
-            if value.ndim:  # a list would not be hashable
-                object.__setattr__(self, item.name, tuple(value.tolist()))
+        keep = object.__setattr__  # a list would not be hashable
         for name in BY_JOINT:
-            if min(getattr(self, name), default=0.0) < 0.0:
-                raise InvalidInput(f"{name}={getattr(self, name)}; it must not be negative")
+            keep(self, name, reals(name, getattr(self, name), NOT_NEGATIVE))
         for name in ("payload_position", "trunk_shift"):
-            if len(getattr(self, name)) != 3:
-                raise InvalidInput(f"{name}={getattr(self, name)}; give x, y and z")
-        if not self.torque_constant > 0.0:
-            raise InvalidInput(f"torque_constant={self.torque_constant:g}; it must be positive")
+            keep(self, name, reals(name, getattr(self, name), length=3))
+        for name, within in (("payload", ANY), ("torque_constant", POSITIVE)):
+            keep(self, name, real(name, getattr(self, name), within))
 
     @property
     def ideal_motors(self) -> bool:

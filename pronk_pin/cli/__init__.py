@@ -10,7 +10,7 @@ from typing import Annotated, Any, Protocol, TextIO, Union
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, subcommand
 
-from .._state import known_name
+from .._checks import known_name
 from ..compare.suites import SUITES, load_suite
 from ..errors import LeakyFilter, PronkError
 from .comparison import Compare, Explain, Report, Reproduce

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from .._state import known_name
+from .._checks import known_name
 from ..control import BASES, ControllerSpec, Skill, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput

@@ -16,7 +16,7 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
-from .._state import known_name
+from .._checks import known_name
 from .._typing import Array, BoolArray, IntArray
 from .._urdf import mujoco_spec
 from ..control import BASES, Gains

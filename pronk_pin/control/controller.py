@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._state import known_name
+from .._checks import known_name
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait

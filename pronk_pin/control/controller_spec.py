@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from .._state import known_name
+from .._checks import known_name
 from ..errors import InvalidInput
 from .balance import BalanceSpec
 from .contacts import ContactDetector

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._state import known_name
+from .._checks import known_name
 from .._typing import Array
 from ..gait import Gait
 from ..inverse_dynamics import SAGITTAL_GUIDE, feedforward

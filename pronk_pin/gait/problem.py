@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from .._state import known_name
+from .._checks import known_name
 from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..robot import Robot

@@ -8,7 +8,7 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from .._state import known_name
+from .._checks import known_name
 from ..errors import InvalidInput
 from ..robot import Robot
 from .problem import BOUND, PITCHING_PRONK, PRONK, Base, ContactPhase, GaitProblem
