@@ -198,7 +198,10 @@ def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixt
         (["compare", "--speeds", "0.1", "0.1"], "speeds must name at least one, and none of them"),
         (["compare", "--base", "floating"], "unknown base 'floating'; choose one of: locked"),
         (["compare", "--workers", "0"], "at least one is needed"),
-        (["compare", "--schedule.learning", "-1"], "finite and not negative"),
+        (
+            ["compare", "--schedule.learning", "-1"],
+            "schedule: learning=-1.0; give a number from 0 to 86400 s",
+        ),
         (["report", "nowhere"], "not a results folder (no config.json); run 'pronk-pin compare'"),
         (["view", "nowhere.npz"], "no such gait library; make it again with 'pronk-pin gaits"),
         (["view", "--speed", "2"], "outside the gait library"),

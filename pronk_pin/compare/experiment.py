@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from .._checks import known_name
+from .._checks import instance_of, known_name, path, real, seed, sequence_of, text
 from ..control import BASES, ControllerSpec, Skill, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
 from ..gait import SPEEDS, Gait, GaitLibrary, load_library
-from ..robot import Robot, load_robot
+from ..robot import ROBOTS, Robot, load_robot
 from .explanation import explain, mended_gaits
 from .foreign import mjcf_sha256
 from .metrics import steady
@@ -65,8 +65,7 @@ class Experiment:
     schedule: Schedule = field(default_factory=Schedule)
 
     def __post_init__(self) -> None:
-        load_robot(self.robot)
-        known_name("base", self.base, BASES)
+        self._check_types()
         library = _gaits(self.robot, self.base)
         names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
         object.__setattr__(self, "scenarios", names)
@@ -83,11 +82,26 @@ class Experiment:
                     f"controller '{controller}' identifies the robot on the locked base; leave it "
                     "out, or use base 'locked'"
                 )
-        if min(self.seeds) < 0:
-            raise InvalidInput("seeds must not be negative")
         if self.world:
             object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
         object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
+
+    def _check_types(self) -> None:
+        known_name("robot", self.robot, ROBOTS)
+        known_name("base", self.base, BASES)
+        keep = object.__setattr__
+        for name, check, most in (
+            ("speeds", real, 1000),
+            ("controllers", text, 1000),
+            ("scenarios", text, 1000),
+            ("seeds", seed, 10_000),
+        ):
+            values: tuple[object, ...] = sequence_of(name, getattr(self, name), check, wanted=name)
+            if len(values) > most:
+                raise InvalidInput(f"{len(values)} {name}; give {most} or fewer")
+            keep(self, name, values)
+        keep(self, "world", "" if self.world == "" else str(path("world", self.world)))
+        instance_of("schedule", self.schedule, Schedule)
 
     def cells(self) -> tuple[Cell, ...]:
         """The simulations, in an order in which each finds what it depends on done before it."""

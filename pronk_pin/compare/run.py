@@ -6,7 +6,6 @@ file as bytes, so that they may sit on other machines and be killed at any momen
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 import time
@@ -21,8 +20,11 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from .._checks import instance_of, path
+from .._workers import worker_count
 from ..control import load_controller
-from ..errors import FileProblem, InvalidInput, WorkerLost
+from ..errors import FileProblem, WorkerLost
+from .demand import check_demand
 from .executors import Crew, connect, count_steps, processes
 from .experiment import PRACTISED, Cell, Experiment, run_cell
 from .provenance import describe_run
@@ -38,7 +40,7 @@ _one_at_a_time = threading.Lock()
 
 def run_experiment(
     experiment: Experiment,
-    folder: Path,
+    folder: Path | str,
     *,
     workers: int | None = None,
     executor: Executor | str | None = None,
@@ -65,9 +67,10 @@ def run_experiment(
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
     """
-    workers = workers if workers is not None else os.cpu_count() or 1
-    if workers < 1:
-        raise InvalidInput(f"{workers} workers; at least one is needed")
+    instance_of("experiment", experiment, Experiment)
+    workers, folder = worker_count(workers), path("folder", folder)
+    if executor is None:
+        check_demand(experiment, workers)
     results = Results.create(experiment, folder)
     with results.locked():
         cells = [cell for cell in experiment.cells() if not results.has(cell)]

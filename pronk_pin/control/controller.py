@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._checks import known_name
+from .._checks import Interval, instance_of, known_name, real, sequence_of
+from .._state import as_array, as_numbers, as_robot
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait
@@ -22,7 +23,7 @@ from .estimation import SpeedEstimator
 from .feedforward import BASES
 from .filters import ZeroPhaseFilter
 from .guided_strides import Settings
-from .learning import SKIPPED, anti_windup, given
+from .learning import SKIPPED, anti_windup, given, learned_by
 from .linearise import lifted_model
 from .model_based import ModelBasedILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
@@ -36,6 +37,33 @@ LATEST_TOUCHDOWN = 2.0
 
 _LATE_TOUCHDOWN = 1.2
 """The tape of a flight is so many times as long as its reference, beyond which it is held."""
+
+
+TIMESTEP = Interval(1e-5, 0.01, "s")
+"""Time steps of the control that make sense."""
+
+
+def known_gaits(robot: Robot, gaits: Sequence[Gait]) -> tuple[Gait, ...]:
+    """Gaits of a robot, one or more.
+
+    Raises:
+        InvalidInput: There is none, or one is no gait, or of another robot.
+    """
+    as_robot(robot)
+    if isinstance(gaits, Gait):
+        raise InvalidInput("gaits is one Gait; give a list, with a gait for each robot")
+    found = sequence_of(
+        "gaits", gaits, lambda name, gait: instance_of(name, gait, Gait), wanted="gaits"
+    )
+    if not found:
+        raise InvalidInput("gaits is empty; give one for each robot")
+    for gait in found:
+        if gait.robot != robot.name:
+            raise InvalidInput(
+                f"a gait of the {gait.robot} cannot be played by the {robot.name}; take it from "
+                f"load_library('{robot.name}')"
+            )
+    return found
 
 
 class Controller:
@@ -63,16 +91,24 @@ class Controller:
         flight: Array | None = None,
         base: str = "locked",
     ) -> None:
+        gaits = known_gaits(robot, gaits)
+        instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
+        timestep = real("timestep", timestep, TIMESTEP)
         n = len(gaits)
         known_name("base", base, BASES)
         shape = (n, len(PARTS), SAMPLES, NL)
-        if feedforward is None:
-            feedforward = np.zeros(shape)
+        feedforward = (
+            np.zeros(shape) if feedforward is None else as_numbers("feedforward", feedforward)
+        )
+        if flight is not None:
+            flight = as_array("flight", flight, n, ())
         if feedforward.shape != shape:
             raise InvalidInput(
                 f"a feedforward of shape {feedforward.shape}; expected {shape}: "
                 "torques on the phase grids of stance and flight for each gait"
             )
+        if not np.isfinite(feedforward).all():
+            raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
         self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
         self.feedforward = feedforward.copy()
         self._timestep = timestep
@@ -271,7 +307,7 @@ class Controller:
         for part, law in enumerate(self._laws):
             if law is not None and rows.size:
                 record = self._last[part].take(rows)
-                learned = law.update(self._told(part, rows, record))
+                learned = learned_by(law, self._told(part, rows, record), self.spec.name)
                 self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
 
     def _told(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
