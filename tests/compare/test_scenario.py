@@ -125,7 +125,10 @@ def test_sampled_worlds_are_known_by_seed_and_index_whatever_their_number() -> N
 
 @pytest.mark.parametrize(("n", "seed"), [(0, 0), (1, -1)])
 def test_no_sampled_world_and_no_negative_seed(n: int, seed: int) -> None:
-    with pytest.raises(InvalidInput, match="(n=0; give a whole number from 1|seed=-1; give a whole number from 0) to"):
+    with pytest.raises(
+        InvalidInput,
+        match=r"(n=0; give a whole number from 1|seed=-1; give a whole number from 0) to",
+    ):
         random_scenarios(n, seed)
 
 

@@ -217,5 +217,5 @@ def test_a_reading_that_is_not_a_number_changes_nothing(broken: int) -> None:
 
 @pytest.mark.parametrize("wrong", [{"gain": -1.0}, {"gain": np.nan}, {"rest": 0.0}])
 def test_an_attitude_filter_that_makes_no_sense_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InvalidInput, match="attitude filter: .*; give a number"):
+    with pytest.raises(InvalidInput, match=r"attitude filter: .*; give a number"):
         AttitudeFilter(**wrong)
