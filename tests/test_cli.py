@@ -211,7 +211,7 @@ def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixt
         (["parity", "nowhere.xml"], "nowhere.xml: cannot be read (No such file or directory)"),
         (["parity", "--robot", "spot"], "unknown robot 'spot'; choose one of: a1"),
         (["parity", "--states", "0"], "states=0; at least one is needed"),
-        (["parity", "--seed", "-1"], "seed=-1; give a number from 0 on"),
+        (["parity", "--seed", "-1"], "seed=-1; give a whole number from 0 on"),
         (["parity", "--tolerance", "-1"], "tolerance=-1.0; give a number from 0 on"),
         (["gaits", "build", "--speeds", "fast"], "speeds 'fast' is neither a number nor a range"),
         (["gaits", "build", "--gait", "trot"], "unknown gait 'trot'; choose one of: pronk, bound"),

@@ -265,7 +265,10 @@ class Results:
             if (cell.controller, cell.scenario) == (controller, scenario):
                 return cell
         known = ", ".join(sorted({cell.controller for cell in self.experiment.cells()}))
-        raise InvalidInput(f"no '{controller}' in scenario '{scenario}'; the result has {known}")
+        raise InvalidInput(
+            f"no '{controller}' in scenario '{scenario}'; the result has the controllers {known} "
+            f"in the scenarios {', '.join(self.experiment.scenarios)}"
+        )
 
     def summarize(self) -> pd.DataFrame:
         """Compute the summary from the strides, and write summary.csv."""

@@ -16,7 +16,9 @@ def describe_library(library: GaitLibrary) -> str:
         InvalidInput: The library has no audit.
     """
     if not library.audit:
-        raise InvalidInput("this gait library has no audit; build it with 'pronk-pin gaits build'")
+        raise InvalidInput(
+            "this gait library has no audit; build it anew with 'pronk-pin gaits build'"
+        )
     lines = [
         "  speed   apex  stride  violation  18-DoF res.  stance drift      foot  flight drift"
         "  order    Bezier  torque  velocity  friction",

@@ -147,7 +147,8 @@ class Gait:
         for phase in self.phases:
             if phase.name == name:
                 return phase
-        raise InvalidInput(f"the gait has no phase '{name}'")
+        known = ", ".join(phase.name for phase in self.phases)
+        raise InvalidInput(f"the gait has no phase '{name}'; choose one of: {known}")
 
     @property
     def stance(self) -> GaitPhase:

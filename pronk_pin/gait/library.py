@@ -302,7 +302,7 @@ def _check_audit(path: Path, library: GaitLibrary) -> None:
             raise FileProblem(
                 path,
                 f"the gait at {gait.speed:g} m/s, apex {gait.apex:g} m, fails its audit ({failed})",
-                "see it with 'pronk-pin gaits show --library', and build it anew",
+                f"see it with 'pronk-pin gaits show --library {path}', and build it anew",
             )
 
 
@@ -359,7 +359,19 @@ def load_library(
         UnknownName: There is no such gait.
         FileProblem: None is shipped for it.
     """
-    return _shipped(library_name(robot, gait, base))
+    name = library_name(robot, gait, base)
+    if not (resources.files(__package__) / "data" / f"{name}.npz").is_file():
+        options = "".join(
+            f" --{option} {value}"
+            for option, value in (("robot", robot), ("gait", gait), ("base", base))
+            if value is not None
+        )
+        raise FileProblem(
+            f"{name}.npz",
+            "no such gait library is shipped",
+            f"build one with 'pronk-pin gaits build{options}', and look at it with --library",
+        )
+    return _shipped(name)
 
 
 @lru_cache(maxsize=8)

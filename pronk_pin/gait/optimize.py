@@ -245,7 +245,10 @@ def _solve(
     if isinstance(state, SolverState):
         start = state.as_start()
         if len(state.x) != len(program.bounds["lbx"]) or len(state.lam_g) != program.size:
-            raise InvalidInput("the solver's state belongs to another kind of gait problem")
+            raise InvalidInput(
+                "the solver's state belongs to another kind of gait problem; take the state of a "
+                "solution with the same sequence, base and mesh"
+            )
     else:
         guess = vertical_hop(problem) if state is None else state
         start = {"x0": program.pack(guess)}

@@ -227,7 +227,9 @@ class GaitProblem:
 def _check_sequence(sequence: tuple[ContactPhase, ...]) -> None:
     names = [phase.name for phase in sequence]
     if len(set(names)) < len(names):
-        raise InvalidInput(f"two phases of the sequence {', '.join(names)} have the same name")
+        raise InvalidInput(
+            f"two phases of the sequence {', '.join(names)} have the same name; rename one"
+        )
     if all(phase.stands for phase in sequence):
         raise InvalidInput(
             "the sequence has no flight, so that no apex exists; add a phase of none"

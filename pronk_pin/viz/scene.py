@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._checks import shown, text
+from .._state import as_numbers
 from .._typing import Array
 from ..errors import InvalidInput
 from ..robot import Robot
@@ -82,9 +84,10 @@ class Track:
 
     def __post_init__(self) -> None:
         for key in ("t", "q", *self.channels):
-            object.__setattr__(self, key, np.asarray(getattr(self, key), dtype=float))
-        if not self.name:
-            raise InvalidInput("a track needs a name")
+            values = as_numbers(f"track {shown(self.name)}: {key}", getattr(self, key))
+            object.__setattr__(self, key, values)
+        if not text("name of a track", self.name):
+            raise InvalidInput("a track needs a name; give one")
         if self.t.ndim != 1 or len(self.t) == 0 or np.any(np.diff(self.t) <= 0.0):
             raise InvalidInput(f"track '{self.name}': t must increase from one sample to the next")
         for key in ("t", "q"):

@@ -126,7 +126,8 @@ def test_a_cell_is_found_by_its_controller(comparison: Results) -> None:
     with pytest.raises(InvalidInput) as caught:
         comparison.find(controller="model")
     assert str(caught.value) == (
-        "no 'model' in scenario 'nominal'; the result has ilc, library, pd"
+        "no 'model' in scenario 'nominal'; the result has the controllers ilc, library, pd in the "
+        "scenarios nominal"
     )
 
 
