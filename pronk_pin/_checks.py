@@ -8,15 +8,16 @@ wanted. States and arrays are checked in `pronk_pin._state`.
 from __future__ import annotations
 
 import math
-import numbers
 import operator
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from .errors import InvalidInput, UnknownName
 
@@ -242,6 +243,26 @@ def reals(
     )
 
 
+def numbers(**arrays: npt.ArrayLike) -> list[npt.NDArray[np.float64]]:
+    """Float64 arrays of any shape, by name; texts and truth values are no numbers.
+
+    Raises:
+        InvalidInput: One is no array of numbers.
+    """
+    found = []
+    for name, value in arrays.items():
+        try:
+            array = np.asarray(value)
+            if array.dtype.kind not in "iuf":
+                raise TypeError(f"it holds {array.dtype.name.rstrip('0123456789')} values")
+            found.append(np.asarray(array, dtype=np.float64))
+        except (TypeError, ValueError) as error:
+            raise InvalidInput(
+                f"{name} is not an array of numbers ({error}); pass floats"
+            ) from error
+    return found
+
+
 def none_or(check: Callable[..., T], name: str, value: Any, *others: Any) -> T | None:
     """None, or what a check makes of the value."""
     return None if value is None else check(name, value, *others)
@@ -290,7 +311,7 @@ def _number(value: Any) -> float | None:
         return None
     if isinstance(value, np.ndarray) and value.shape == () and value.dtype.kind in "iuf":
         value = value.item()
-    if not isinstance(value, numbers.Real):
+    if not isinstance(value, Real):
         return None
     try:
         return float(value)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._checks import instance_of, known_name, sequence_of, text
+from ._checks import instance_of, known_name, numbers, sequence_of, text
 from ._typing import Array
 from .errors import InvalidInput
 from .robot import Robot
@@ -74,13 +74,8 @@ def as_numbers(name: str, value: npt.ArrayLike) -> Array:
     Raises:
         InvalidInput: Not an array of numbers.
     """
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind not in "iuf":
-            raise TypeError(f"it holds {array.dtype.name.rstrip('0123456789')} values")
-        return np.asarray(array, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"{name} is not an array of numbers ({error}); pass floats") from error
+    (array,) = numbers(**{name: value})
+    return array
 
 
 def _one_sound(value: Any, size: int) -> bool:
@@ -112,10 +107,10 @@ def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
     """
     as_robot(robot)
     if type(q) is np.ndarray and q.dtype is _FLOAT and q.shape == (robot.nq,):
-        numbers = q.tolist()
-        x, y, z, w = numbers[3:7]
+        values = q.tolist()
+        x, y, z, w = values[3:7]
         off = x * x + y * y + z * z + w * w - 1.0
-        if -_UNIT_TOLERANCE < off < _UNIT_TOLERANCE and isfinite(sum(numbers)):
+        if -_UNIT_TOLERANCE < off < _UNIT_TOLERANCE and isfinite(sum(values)):
             return q
     array = as_array("q", q, robot.nq, None)
     norms = np.ravel(np.linalg.norm(array[..., 3:7], axis=-1))

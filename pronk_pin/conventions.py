@@ -54,6 +54,8 @@ class PinocchioState(NamedTuple):
 
 def joint_order(names: tuple[str, ...], wanted: tuple[str, ...]) -> IntArray:
     """Indices that pick `wanted` out of `names`: `x_wanted = x_names[..., indices]`."""
+    names = names if isinstance(names, tuple) else sequence_of("names", names, text)
+    wanted = wanted if isinstance(wanted, tuple) else sequence_of("wanted", wanted, text)
     if sorted(names) != sorted(wanted):
         raise InvalidInput(
             f"the joints {', '.join(names)} and {', '.join(wanted)} are not the same; "

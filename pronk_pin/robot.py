@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from ._checks import instance_of, known_name
+from ._checks import instance_of, known_name, numbers
 from ._typing import Array, IntArray
 from .errors import FileProblem, InvalidInput
 from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
@@ -221,13 +221,15 @@ class Robot:
         Returns:
             q, shape (..., 19).
         """
-        position, joints = np.asarray(position, dtype=float), np.asarray(joints, dtype=float)
-        if position.shape[-1:] != (3,) or position.shape[:-1] != joints.shape[:-1]:
+        # The checks of states are a floor above.
+        position, joints, pitch = numbers(position=position, joints=joints, pitch=pitch)
+        fits = position.shape[-1:] == (3,) and joints.shape == (*position.shape[:-1], self.nu)
+        if not fits or pitch.shape not in ((), position.shape[:-1]):
             raise InvalidInput(
-                f"position has shape {position.shape} and joints {joints.shape}; give (..., 3) and "
-                f"(..., {self.nu}), of the same batch"
+                f"position, joints and pitch have the shapes {position.shape}, {joints.shape} and "
+                f"{pitch.shape}; give (..., 3), (..., {self.nu}) and (...), of the same batch"
             )
-        half = 0.5 * np.broadcast_to(np.asarray(pitch, dtype=float), position.shape[:-1])
+        half = 0.5 * np.broadcast_to(pitch, position.shape[:-1])
         zero = np.zeros_like(half)
         quaternion = np.stack([zero, np.sin(half), zero, np.cos(half)], axis=-1)
         return np.concatenate([position, quaternion, joints], axis=-1)

@@ -50,7 +50,8 @@ class RobotSpec:
     def __post_init__(self) -> None:
         file_name("name", self.name)
         for name in ("urdf", "base_link", "joint_pattern", "foot_pattern"):
-            text(name, getattr(self, name))
+            if not text(name, getattr(self, name)):
+                raise InvalidInput(f"{name} is empty; give what stands in the URDF")
         for name in ("legs", "joints"):
             object.__setattr__(self, name, sequence_of(name, getattr(self, name), text))
         self._check_patterns()

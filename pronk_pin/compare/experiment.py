@@ -100,7 +100,8 @@ class Experiment:
             if len(values) > most:
                 raise InvalidInput(f"{len(values)} {name}; give {most} or fewer")
             keep(self, name, values)
-        keep(self, "world", "" if self.world == "" else str(path("world", self.world)))
+        if not isinstance(self.world, str) or self.world:
+            keep(self, "world", str(path("world", self.world)))
         instance_of("schedule", self.schedule, Schedule)
 
     def cells(self) -> tuple[Cell, ...]:

@@ -33,6 +33,8 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
+from .._checks import file_name, instance_of
+from .._checks import path as known_path
 from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, UnknownName, cannot_write
 from ..robot import load_robot
 from .experiment import Cell, Experiment
@@ -67,7 +69,7 @@ class Results:
     experiment: Experiment
 
     @classmethod
-    def create(cls, experiment: Experiment, folder: Path) -> Results:
+    def create(cls, experiment: Experiment, folder: Path | str) -> Results:
         """Make the folder, or take up one that holds the same experiment.
 
         Raises:
@@ -75,7 +77,8 @@ class Results:
                 MJCF cannot be read.
             InvalidInput: The MJCF is not of this robot.
         """
-        results = cls(folder, experiment)
+        folder = known_path("folder", folder)
+        results = cls(folder, instance_of("experiment", experiment, Experiment))
         taken = (folder / "config.json").exists()
         if taken and cls.load(folder).experiment != experiment:
             raise FileProblem(folder, "holds another experiment", "choose another folder")
@@ -100,7 +103,7 @@ class Results:
         Raises:
             FileProblem: It is missing or damaged.
         """
-        folder = Path(folder)
+        folder = known_path("folder", folder)
         path = folder / "config.json"
         if not path.is_file():
             raise FileProblem(folder, "not a results folder (no config.json)", _AGAIN)
@@ -341,6 +344,7 @@ def encode(strides: xr.Dataset) -> bytes:
 
 def default_folder(name: str = "comparison") -> Path:
     """results/<time>-<name> below the current folder."""
+    file_name("name", name)
     return Path("results") / f"{datetime.now():%Y%m%d-%H%M%S}-{name}"
 
 

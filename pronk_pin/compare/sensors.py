@@ -6,7 +6,7 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from .._checks import NOT_NEGATIVE, Interval, keep_reals, real
+from .._checks import NOT_NEGATIVE, Interval, instance_of, keep_reals, real, whole
 from .._typing import Array, IntArray
 from ..robot import NL
 
@@ -77,7 +77,9 @@ class SensorSuite:
     """
 
     def __init__(self, sensors: Sensors, n: int, rng: np.random.Generator) -> None:
-        self.sensors = sensors
+        instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
+        n = whole("n", n, Interval(1, 100_000))
+        self.sensors = instance_of("sensors", sensors, Sensors)
         self._streams = rng.spawn(n)
         biases = np.stack([stream.standard_normal(NL + 6) for stream in self._streams])
         self._encoder_bias = sensors.encoder_bias * biases[:, :NL]

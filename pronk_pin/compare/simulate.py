@@ -12,10 +12,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .._checks import instance_of, known_name, whole
+from .._checks import Interval, flag, instance_of, known_name, whole
 from .._typing import Array, IntArray
 from ..control import BASES, Controller, ControllerSpec
-from ..control.controller import known_gaits
+from ..control.feedforward import known_gaits
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..robot import Robot
@@ -75,7 +75,8 @@ class Simulation:
         instance_of("scenario", scenario, Scenario, "a Scenario, as load_scenario() returns it")
         instance_of("schedule", schedule, Schedule)
         instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
-        threads = whole("threads", threads)
+        threads = whole("threads", threads, Interval(high=1024))
+        flag("chunked", chunked)
         known_name("base", base, BASES)
         check_memory(gaits, schedule.duration)
         n, dt = len(gaits), scenario.timestep

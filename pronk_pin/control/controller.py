@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._checks import Interval, instance_of, known_name, real, sequence_of
-from .._state import as_array, as_numbers, as_robot
+from .._checks import Interval, instance_of, known_name, real
+from .._state import as_array, as_numbers
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait
@@ -20,7 +20,7 @@ from ..robot import NL, Robot
 from .balance import Balance
 from .controller_spec import ControllerSpec
 from .estimation import SpeedEstimator
-from .feedforward import BASES
+from .feedforward import BASES, known_gaits
 from .filters import ZeroPhaseFilter
 from .guided_strides import Settings
 from .learning import SKIPPED, anti_windup, given, learned_by
@@ -41,29 +41,6 @@ _LATE_TOUCHDOWN = 1.2
 
 TIMESTEP = Interval(1e-5, 0.01, "s")
 """Time steps of the control that make sense."""
-
-
-def known_gaits(robot: Robot, gaits: Sequence[Gait]) -> tuple[Gait, ...]:
-    """Gaits of a robot, one or more.
-
-    Raises:
-        InvalidInput: There is none, or one is no gait, or of another robot.
-    """
-    as_robot(robot)
-    if isinstance(gaits, Gait):
-        raise InvalidInput("gaits is one Gait; give a list, with a gait for each robot")
-    found = sequence_of(
-        "gaits", gaits, lambda name, gait: instance_of(name, gait, Gait), wanted="gaits"
-    )
-    if not found:
-        raise InvalidInput("gaits is empty; give one for each robot")
-    for gait in found:
-        if gait.robot != robot.name:
-            raise InvalidInput(
-                f"a gait of the {gait.robot} cannot be played by the {robot.name}; take it from "
-                f"load_library('{robot.name}')"
-            )
-    return found
 
 
 class Controller:

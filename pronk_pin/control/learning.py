@@ -5,6 +5,7 @@ A law is a function with parameters and no state: what was learned so far is in 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -128,7 +129,9 @@ def known_law(name: str, law: object) -> LearningLaw | None:
     Raises:
         InvalidInput: It is neither.
     """
-    if law is not None and (isinstance(law, type) or not callable(getattr(law, "update", None))):
+    # Dictionaries and sets have an `update` too.
+    other = isinstance(law, type | Mapping | set) or not callable(getattr(law, "update", None))
+    if law is not None and other:
         raise InvalidInput(
             f"{name}={shown(law)} is no learning law; give an object with update(record), such as "
             "PDTypeILC(), or None"

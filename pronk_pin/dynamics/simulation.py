@@ -164,7 +164,7 @@ def simulate_phase(
     q, v = as_state(robot, q, v)
     as_one("q", q)
     duration = real("duration", duration, Interval(0.0, unit="s", above=True))
-    samples = whole("samples", samples, Interval(2))
+    samples = whole("samples", samples, Interval(2, 1_000_000))
     tolerance = real("tolerance", tolerance, Interval(0.0, 1.0, above=True, below=True))
     problem = _PhaseProblem(
         robot,

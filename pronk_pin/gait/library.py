@@ -52,6 +52,12 @@ class GaitLibrary:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gaits", _known_gaits(self.gaits))
+        instance_of("metadata", self.metadata, Mapping, "a mapping")  # type: ignore[type-abstract]
+        audits = sequence_of("audit", self.audit, lambda k, one: instance_of(k, one, Audit))
+        object.__setattr__(self, "audit", audits)
+        apex: Any = self.apex
+        if not isinstance(apex, float):  # NaN asks for the lowest
+            object.__setattr__(self, "apex", real("apex", apex))
         grid = [(apex, speed) for apex in self.apexes for speed in self.speeds]
         have = [(gait.apex, gait.speed) for gait in self.gaits]
         if not have or len(have) != len(grid) or not np.allclose(have, grid, rtol=0, atol=_SAME):
@@ -304,6 +310,16 @@ def _check_audit(path: Path, library: GaitLibrary) -> None:
                 f"the gait at {gait.speed:g} m/s, apex {gait.apex:g} m, fails its audit ({failed})",
                 f"see it with 'pronk-pin gaits show --library {path}', and build it anew",
             )
+
+
+def known_library(library: GaitLibrary) -> GaitLibrary:
+    """The library itself, if it is one.
+
+    Raises:
+        InvalidInput: It is something else.
+    """
+    wanted = "a GaitLibrary, as load_library() returns it"
+    return instance_of("library", library, GaitLibrary, wanted)
 
 
 def _known_gaits(gaits: Any) -> tuple[Gait, ...]:

@@ -72,7 +72,8 @@ class ContactPhase:
     order: int
 
     def __post_init__(self) -> None:
-        text("name of a phase", self.name)
+        if not text("name of a phase", self.name):
+            raise InvalidInput("a phase needs a name; give one, as 'stance'")
         keep = object.__setattr__
         keep(self, "duration", _duration_range(self.name, self.duration))
         keep(self, "stands", sequence_of(f"{self.name}: stands", self.stands, text))

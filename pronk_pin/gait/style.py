@@ -82,7 +82,7 @@ def gait_problem(
         InvalidInput: The problem makes no sense.
     """
     style = load_style(gait)
-    base = style.base if base is None else base
+    base = style.base if base is None else known_base(base)
     given: dict[str, Any] = {
         "apex": style.apex,
         "base": base,

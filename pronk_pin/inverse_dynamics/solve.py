@@ -166,7 +166,7 @@ def feedforward(
         InvalidInput: Fewer than two samples, or as `inverse_dynamics`.
         UnknownName: As `inverse_dynamics`.
     """
-    samples = whole("samples", samples, Interval(2))
+    samples = whole("samples", samples, Interval(2, 100_000))
     as_robot(robot)
     if not hasattr(gait, "stance"):  # gaits are a floor above
         raise InvalidInput(f"gait={shown(gait)} is no Gait; take one of a library, by its at()")

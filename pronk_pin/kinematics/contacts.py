@@ -81,7 +81,7 @@ def contact_radius(robot: Robot, contact: str) -> float:
     Raises:
         UnknownName: There is no such contact.
     """
-    if contact == "point":
+    if isinstance(contact, str) and contact == "point":
         return 0.0
     known_name("contact", contact, CONTACTS)
     return robot.foot_radius

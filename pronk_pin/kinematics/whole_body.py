@@ -104,7 +104,7 @@ def inverse_kinematics(
     targets = as_array("feet", targets, 3, (len(indices),))
     base_weight = real("base_weight", base_weight, POSITIVE)
     tolerance = real("tolerance", tolerance, POSITIVE)
-    iterations = whole("iterations", iterations, Interval(1))
+    iterations = whole("iterations", iterations, Interval(1, 1_000_000))
     q = robot.standing.copy() if initial is None else as_one("initial", as_q(robot, initial)).copy()
     pose = None
     if base is not None:

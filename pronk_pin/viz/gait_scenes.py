@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._checks import Interval, instance_of, none_or, real, whole
+from .._state import as_robot
 from ..errors import InvalidInput
 from ..gait import Gait, GaitLibrary
 from ..robot import Robot, load_robot
@@ -40,6 +41,7 @@ def gait_scene(
         dt: Time between samples [s].
     """
     strides, dt = whole("strides", strides, Interval(1, 1000)), real("dt", dt, _SAMPLING)
+    as_robot(robot)
     instance_of("gait", gait, Gait)
     times, configurations, forces, torques, marks = [], [], [], [], []
     for stride in range(strides):
@@ -92,7 +94,7 @@ def library_programme(
     """
     instance_of("library", library, GaitLibrary, "a GaitLibrary, as load_library() returns it")
     speed, apex = none_or(real, "speed", speed), none_or(real, "apex", apex)
-    robot = load_robot(library.robot) if robot is None else robot
+    robot = load_robot(library.robot) if robot is None else as_robot(robot)
     kind = str(library.metadata.get("gait", "gait"))
     friction = library.metadata.get("problem", {}).get("friction")
     if speed is None:

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
-from .._checks import flag, none_or, real, whole
+from .._checks import flag, none_or, real, text, whole
 from ..errors import FileProblem, InvalidInput, cannot_write
 from .browser import Browser
 from .replay import write_replay
@@ -57,7 +57,7 @@ class Film:
                 raise InvalidInput(
                     f"{name}={getattr(self, name)}; give an even number of pixels from 64 to 4096"
                 )
-        if self.color not in ("", "error", "torque"):
+        if text("color", self.color) not in ("", "error", "torque"):
             raise InvalidInput(f"color='{self.color}'; choose error or torque, or leave it out")
         real("at", self.at), none_or(real, "seconds", self.seconds)
         if self.at < 0.0 or (self.seconds is not None and self.seconds <= 0.0):

@@ -136,7 +136,7 @@ def explain(
         instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
     if isinstance(result, xr.Dataset):
         strides = result
-    elif not hasattr(result, "find"):
+    elif not callable(getattr(result, "strides", None)):
         raise InvalidInput(
             f"result={shown(result)} is no result; give Results.load(folder), or its strides"
         )
