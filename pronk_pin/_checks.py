@@ -194,7 +194,7 @@ def instance_of(name: str, value: Any, kind: type[T], wanted: str = "") -> T:
         InvalidInput: It is of another class.
     """
     if not isinstance(value, kind):
-        what = wanted or f"a {kind.__name__}"
+        what = wanted or _with_article(kind.__name__)
         raise InvalidInput(f"{name}={shown(value)} is {_kind(value)}; give {what}")
     return value
 
@@ -323,7 +323,10 @@ def _kind(value: object) -> str:
     """What something is, in a word or two."""
     if value is None:
         return "nothing"
-    name = type(value).__name__
+    return _with_article(type(value).__name__)
+
+
+def _with_article(name: str) -> str:
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 

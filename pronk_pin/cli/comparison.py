@@ -16,6 +16,7 @@ from ..compare import Experiment, Results, default_folder, describe, explain, ru
 from ..compare.changes import format_changes
 from ..compare.closing import close_loop, format_loop
 from ..compare.demand import check_demand
+from ..compare.executors import known_address
 from ..compare.explanation.explain import DRAWS, IMU_NOISE, check_learner
 from ..compare.reproduce import format_reproduction
 from ..compare.suites import load_suite
@@ -53,6 +54,8 @@ class Compare:
         workers = worker_count(self.workers)
         if self.executor is None:
             check_demand(self.experiment, workers)  # before a folder is made
+        else:
+            known_address(self.executor)
         name = "comparison" if self.suite == "default" else self.suite
         folder = self.folder or default_folder(name)
         foreign = Results.create(self.experiment, folder).foreign

@@ -25,7 +25,7 @@ from .._workers import worker_count
 from ..control import load_controller
 from ..errors import FileProblem, WorkerLost
 from .demand import check_demand
-from .executors import Crew, connect, count_steps, processes
+from .executors import Crew, connect, count_steps, known_address, processes
 from .experiment import PRACTISED, Cell, Experiment, run_cell
 from .provenance import describe_run
 from .results import Results, encode
@@ -71,6 +71,10 @@ def run_experiment(
     workers, folder = worker_count(workers), path("folder", folder)
     if executor is None:
         check_demand(experiment, workers)
+    elif isinstance(executor, str):
+        known_address(executor)
+    else:
+        instance_of("executor", executor, Executor, "an Executor, or an address dask://HOST:PORT")
     results = Results.create(experiment, folder)
     with results.locked():
         cells = [cell for cell in experiment.cells() if not results.has(cell)]
