@@ -1,4 +1,4 @@
-"""The one place where states, feet and options that a user passes in are checked.
+"""The one place where states and feet that a user passes in are checked; others: `_checks`.
 
 Leading dimensions are a batch: `(..., 19)` is one configuration or any batch of them.
 """
@@ -6,7 +6,7 @@ Leading dimensions are a batch: `(..., 19)` is one configuration or any batch of
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from functools import lru_cache
 from math import isfinite
 from typing import Any
@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ._checks import instance_of, known_name, numbers, sequence_of, text
 from ._typing import Array
-from .errors import InvalidInput, UnknownName
+from .errors import InvalidInput
 from .robot import Robot
 
 _UNIT_TOLERANCE = 1e-6
@@ -54,10 +55,7 @@ def as_array(name: str, value: npt.ArrayLike, size: int, batch: tuple[int, ...] 
     """
     if not batch and _one_sound(value, size):
         return value  # type: ignore[return-value]
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(f"{name} is not an array of numbers ({error}); pass floats") from error
+    array = as_numbers(name, value)
     leading = "..." if batch is None else ", ".join(map(str, batch))
     if array.shape[-1:] != (size,) or (batch is not None and array.shape[:-1] != batch):
         expected = f"({leading}, {size})" if leading else f"({size},)"
@@ -67,6 +65,16 @@ def as_array(name: str, value: npt.ArrayLike, size: int, batch: tuple[int, ...] 
         )
     if not np.isfinite(array).all():
         raise InvalidInput(f"{name} holds NaN or infinite values; remove them first")
+    return array
+
+
+def as_numbers(name: str, value: npt.ArrayLike) -> Array:
+    """A float64 array of any shape; texts and truth values are no numbers.
+
+    Raises:
+        InvalidInput: Not an array of numbers.
+    """
+    (array,) = numbers(**{name: value})
     return array
 
 
@@ -80,17 +88,29 @@ def _one_sound(value: Any, size: int) -> bool:
     )
 
 
+def as_robot(robot: object) -> Robot:
+    """The robot itself, if it is one.
+
+    Raises:
+        InvalidInput: It is something else, its name perhaps.
+    """
+    if isinstance(robot, Robot):
+        return robot
+    return instance_of("robot", robot, Robot, "a Robot, as load_robot() returns it")
+
+
 def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
     """A configuration (..., nq) with a unit base quaternion.
 
     Raises:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
     """
+    as_robot(robot)
     if type(q) is np.ndarray and q.dtype is _FLOAT and q.shape == (robot.nq,):
-        numbers = q.tolist()
-        x, y, z, w = numbers[3:7]
+        values = q.tolist()
+        x, y, z, w = values[3:7]
         off = x * x + y * y + z * z + w * w - 1.0
-        if -_UNIT_TOLERANCE < off < _UNIT_TOLERANCE and isfinite(sum(numbers)):
+        if -_UNIT_TOLERANCE < off < _UNIT_TOLERANCE and isfinite(sum(values)):
             return q
     array = as_array("q", q, robot.nq, None)
     norms = np.ravel(np.linalg.norm(array[..., 3:7], axis=-1))
@@ -130,8 +150,9 @@ def leg_indices(robot: Robot, feet: Iterable[str] | None) -> tuple[int, ...]:
         UnknownName: The robot has no such leg.
         InvalidInput: A leg is named twice, which would make its contact singular.
     """
+    as_robot(robot)
     if feet is not None:
-        feet = (feet,) if isinstance(feet, str) else tuple(feet)
+        feet = (feet,) if isinstance(feet, str) else sequence_of("feet", feet, text)
     return _leg_indices(robot, feet)
 
 
@@ -144,14 +165,3 @@ def _leg_indices(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, ...]
     if len(set(names)) != len(names):
         raise InvalidInput(f"feet={list(names)} names a leg twice; name each leg once")
     return tuple(robot.legs.index(name) for name in names)
-
-
-def known_name(kind: str, name: str, known: Collection[str]) -> str:
-    """The name itself, if it is known.
-
-    Raises:
-        UnknownName: It is not.
-    """
-    if name not in known:
-        raise UnknownName(kind, name, known)
-    return name

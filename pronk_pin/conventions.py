@@ -19,7 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ._state import as_array, as_q
+from ._checks import sequence_of, text
+from ._state import as_array, as_q, as_robot
 from ._typing import Array, IntArray
 from .errors import InvalidInput
 from .robot import Robot
@@ -53,6 +54,8 @@ class PinocchioState(NamedTuple):
 
 def joint_order(names: tuple[str, ...], wanted: tuple[str, ...]) -> IntArray:
     """Indices that pick `wanted` out of `names`: `x_wanted = x_names[..., indices]`."""
+    names = names if isinstance(names, tuple) else sequence_of("names", names, text)
+    wanted = wanted if isinstance(wanted, tuple) else sequence_of("wanted", wanted, text)
     if sorted(names) != sorted(wanted):
         raise InvalidInput(
             f"the joints {', '.join(names)} and {', '.join(wanted)} are not the same; "
@@ -85,7 +88,7 @@ def to_mujoco(
         InvalidInput: A shape does not fit, `a` comes without `v`, or `joints` are not the robot's.
     """
     q, v, a, tau = _checked(robot, q, v, a, tau)
-    order = joint_order(robot.joint_names, tuple(joints or robot.urdf_joint_names))
+    order = joint_order(robot.joint_names, _given_joints(robot, joints))
     rotation = rotation_matrix(q[..., 3:7])
     qpos = np.concatenate([q[..., :3], q[..., [6, 3, 4, 5]], q[..., 7:][..., order]], axis=-1)
     qvel = qacc = None
@@ -113,7 +116,7 @@ def from_mujoco(
     The inverse of `to_mujoco`; arguments and errors are those of its result.
     """
     qpos, qvel, qacc, ctrl = _checked(robot, qpos, qvel, qacc, ctrl)
-    order = joint_order(tuple(joints or robot.urdf_joint_names), robot.joint_names)
+    order = joint_order(_given_joints(robot, joints), robot.joint_names)
     q = np.concatenate([qpos[..., :3], qpos[..., [4, 5, 6, 3]], qpos[..., 7:][..., order]], axis=-1)
     inverse = np.swapaxes(rotation_matrix(q[..., 3:7]), -1, -2)
     v = a = None
@@ -132,7 +135,7 @@ def to_paper(robot: Robot, joints: Array) -> Array:
     Raises:
         InvalidInput: A wrong shape, NaN, or a robot that has not two front and two rear legs.
     """
-    return as_array("joints", joints, robot.nu, None)[
+    return as_array("joints", joints, as_robot(robot).nu, None)[
         ..., joint_order(robot.joint_names, _paper_names(robot))
     ]
 
@@ -142,7 +145,7 @@ def from_paper(robot: Robot, joints: Array) -> Array:
 
     Errors are those of `to_paper`.
     """
-    return as_array("joints", joints, robot.nu, None)[
+    return as_array("joints", joints, as_robot(robot).nu, None)[
         ..., joint_order(_paper_names(robot), robot.joint_names)
     ]
 
@@ -156,6 +159,10 @@ def rotation_matrix(quaternion: Array) -> Array:
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _given_joints(robot: Robot, joints: Sequence[str] | None) -> tuple[str, ...]:
+    return robot.urdf_joint_names if joints is None else sequence_of("joints", joints, text)
 
 
 def _paper_names(robot: Robot) -> tuple[str, ...]:

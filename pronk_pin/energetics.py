@@ -13,7 +13,8 @@ import numpy.typing as npt
 import pinocchio as pin
 from scipy.integrate import trapezoid
 
-from ._state import as_array, as_q, as_state
+from ._checks import SHARE, real
+from ._state import as_array, as_numbers, as_q, as_robot, as_state
 from ._typing import Array
 from .errors import InvalidInput
 from .robot import NB, Robot
@@ -107,7 +108,7 @@ def mechanical_power(robot: Robot, v: npt.ArrayLike, tau: npt.ArrayLike) -> Arra
     Raises:
         InvalidInput: A wrong shape or NaN.
     """
-    v = as_array("v", v, robot.nv, None)
+    v = as_array("v", v, as_robot(robot).nv, None)
     return v[..., NB:] * as_array("tau", tau, robot.nu, v.shape[:-1])
 
 
@@ -141,14 +142,13 @@ def cost_of_transport(
             regeneration outside [0, 1].
     """
     q, v = as_state(robot, q, v)
-    t = np.asarray(t, dtype=float)
+    t = as_numbers("t", t)
     if q.ndim != 2 or t.shape != q.shape[:1] or len(t) < 2 or not (np.diff(t) > 0.0).all():
         raise InvalidInput(
             f"t has shape {t.shape} and q {q.shape}; give two or more samples, (n,) and "
             f"(n, {robot.nq}), at increasing times"
         )
-    if not 0.0 <= regeneration <= 1.0:
-        raise InvalidInput(f"regeneration={regeneration}; choose a number from 0 to 1")
+    regeneration = real("regeneration", regeneration, SHARE)
     power = mechanical_power(robot, v, tau)
     spent = np.where(power > 0.0, power, regeneration * power).sum(axis=-1)
     energy = float(trapezoid(spent, t))

@@ -9,6 +9,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+_LONGEST_WORD = 60
+"""Characters of an unknown name that its error shows."""
+
 
 class PronkError(Exception):
     """Base class of all errors of this package."""
@@ -36,7 +39,9 @@ class UnknownName(PronkError):
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind, self.name, self.known = kind, name, tuple(known)
-        super().__init__(f"unknown {kind} '{name}'; choose one of: {', '.join(self.known)}")
+        word = " ".join(name.split())  # in one line, however long
+        word = word if len(word) <= _LONGEST_WORD else f"{word[:_LONGEST_WORD]}..."
+        super().__init__(f"unknown {kind} '{word}'; choose one of: {', '.join(self.known)}")
 
 
 class InvalidInput(PronkError):

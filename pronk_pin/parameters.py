@@ -10,11 +10,12 @@ with the rotors' inertia A, viscous friction D, Coulomb friction C and the torqu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
+from ._checks import Interval, real, reals
 from ._typing import Array, IntArray
 from .errors import InvalidInput
 
@@ -24,6 +25,11 @@ written as tanh(v / SLIDING), so that it has a derivative."""
 
 BY_JOINT = ("armature", "damping", "coulomb")
 """Parameters with a value for each kind of joint."""
+
+
+_BY_JOINT = Interval(0, 1000)
+_PAYLOAD = Interval(-1000, 1000, "kg")
+_CONSTANT = Interval(0, 100, above=True)
 
 
 @dataclass(frozen=True)
@@ -49,20 +55,13 @@ class ModelParameters:
     torque_constant: float = 1.0
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = np.asarray(getattr(self, item.name), dtype=float)
-            if not np.all(np.isfinite(value)):
-                raise InvalidInput(f"{item.name} is not finite; give numbers")
-            if value.ndim:  # a list would not be hashable
-                object.__setattr__(self, item.name, tuple(value.tolist()))
+        keep = object.__setattr__  # a list would not be hashable
         for name in BY_JOINT:
-            if min(getattr(self, name), default=0.0) < 0.0:
-                raise InvalidInput(f"{name}={getattr(self, name)}; it must not be negative")
+            keep(self, name, reals(name, getattr(self, name), _BY_JOINT))
         for name in ("payload_position", "trunk_shift"):
-            if len(getattr(self, name)) != 3:
-                raise InvalidInput(f"{name}={getattr(self, name)}; give x, y and z")
-        if not self.torque_constant > 0.0:
-            raise InvalidInput(f"torque_constant={self.torque_constant:g}; it must be positive")
+            keep(self, name, reals(name, getattr(self, name), length=3))
+        for name, within in (("payload", _PAYLOAD), ("torque_constant", _CONSTANT)):
+            keep(self, name, real(name, getattr(self, name), within))
 
     @property
     def ideal_motors(self) -> bool:

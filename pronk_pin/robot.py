@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from ._checks import instance_of, known_name, numbers
 from ._typing import Array, IntArray
-from .errors import FileProblem, UnknownName
+from .errors import FileProblem, InvalidInput
 from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
 from .robot_spec import JOINTS, ROBOTS, RobotSpec, check_names, locate, read_foot_radius
 
@@ -67,7 +68,7 @@ class Robot:
         Raises:
             InvalidInput: Parameters of another number of joints, or a trunk without mass.
         """
-        return _mended(self.bare or self, parameters)
+        return _mended(self.bare or self, instance_of("parameters", parameters, ModelParameters))
 
     @property
     def name(self) -> str:
@@ -220,7 +221,15 @@ class Robot:
         Returns:
             q, shape (..., 19).
         """
-        half = 0.5 * np.broadcast_to(np.asarray(pitch, dtype=float), position.shape[:-1])
+        # The checks of states are a floor above.
+        position, joints, pitch = numbers(position=position, joints=joints, pitch=pitch)
+        fits = position.shape[-1:] == (3,) and joints.shape == (*position.shape[:-1], self.nu)
+        if not fits or pitch.shape not in ((), position.shape[:-1]):
+            raise InvalidInput(
+                f"position, joints and pitch have the shapes {position.shape}, {joints.shape} and "
+                f"{pitch.shape}; give (..., 3), (..., {self.nu}) and (...), of the same batch"
+            )
+        half = 0.5 * np.broadcast_to(pitch, position.shape[:-1])
         zero = np.zeros_like(half)
         quaternion = np.stack([zero, np.sin(half), zero, np.cos(half)], axis=-1)
         return np.concatenate([position, quaternion, joints], axis=-1)
@@ -238,10 +247,9 @@ def load_robot(robot: str | RobotSpec = "a1") -> Robot:
         InvalidInput: The URDF lacks a joint or a foot that the specification names.
     """
     if isinstance(robot, str):
-        if robot not in ROBOTS:
-            raise UnknownName("robot", robot, ROBOTS)
-        robot = ROBOTS[robot]
-    return _load(robot)
+        robot = ROBOTS[known_name("robot", robot, ROBOTS)]
+    wanted = f"a RobotSpec, or a name, one of: {', '.join(ROBOTS)}"
+    return _load(instance_of("robot", robot, RobotSpec, wanted))
 
 
 @lru_cache(maxsize=16)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pinocchio as pin
 
+from ._checks import file_name, none_or, real, reals, sequence_of, text
 from .errors import FileProblem, InvalidInput
 
 JOINTS = ("hip", "thigh", "calf")
@@ -47,15 +48,35 @@ class RobotSpec:
     foot_radius: float | None = None
 
     def __post_init__(self) -> None:
+        file_name("name", self.name)
+        for name in ("urdf", "base_link", "joint_pattern", "foot_pattern"):
+            if not text(name, getattr(self, name)):
+                raise InvalidInput(f"{name} is empty; give what stands in the URDF")
+        for name in ("legs", "joints"):
+            object.__setattr__(self, name, sequence_of(name, getattr(self, name), text))
+        self._check_patterns()
+        object.__setattr__(self, "standing", reals("standing", self.standing))
         if len(self.standing) not in (len(self.joints), len(self.joint_names)):
             raise InvalidInput(
                 f"standing has {len(self.standing)} angles; give {len(self.joints)}, for the "
                 f"joints of one leg, or {len(self.joint_names)}, for all legs"
             )
-        if self.foot_radius is not None and not 0.0 <= self.foot_radius < float("inf"):
+        object.__setattr__(self, "foot_radius", none_or(real, "foot_radius", self.foot_radius))
+        if self.foot_radius is not None and self.foot_radius < 0.0:
             raise InvalidInput(
                 f"foot_radius={self.foot_radius}; give a length in metres, 0 for point feet"
             )
+
+    def _check_patterns(self) -> None:
+        for name in ("joint_pattern", "foot_pattern"):
+            pattern = getattr(self, name)
+            try:
+                pattern.format(leg="FL", joint="hip")
+            except (KeyError, IndexError, ValueError) as error:
+                raise InvalidInput(
+                    f"{name}={pattern!r} is not a pattern ({error}); write {{leg}} where the name "
+                    "of the leg stands, and {joint} where that of the joint does"
+                ) from error
 
     def leg_joints(self, leg: str) -> tuple[str, ...]:
         """Names of a leg's joints, from the trunk down."""

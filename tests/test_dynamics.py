@@ -393,9 +393,10 @@ def test_torques_may_be_constant_sampled_or_a_function(robot: Robot, crouches: D
 
 def test_a_simulation_that_cannot_be_is_refused(robot: Robot) -> None:
     q, v, tau = robot.standing, np.zeros(18), np.zeros(12)
-    for wrong in ({"duration": 0.0}, {"duration": 1.0, "samples": 1}):
-        with pytest.raises(InvalidInput, match="give a positive duration"):
-            dynamics.simulate_phase(robot, q, v, tau, **wrong)
+    with pytest.raises(InvalidInput, match=r"duration=0\.0; give a positive number \[s\]"):
+        dynamics.simulate_phase(robot, q, v, tau, duration=0.0)
+    with pytest.raises(InvalidInput, match="samples=1; give a whole number from 2 to 1000000"):
+        dynamics.simulate_phase(robot, q, v, tau, duration=1.0, samples=1)
     with pytest.raises(InvalidInput, match=r"tau\(t\) holds NaN"):
         dynamics.simulate_phase(robot, q, v, lambda t: tau * np.nan, duration=0.1)
     with pytest.raises(InvalidInput, match=r"tau has shape \(1, 12\)"):

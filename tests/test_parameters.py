@@ -226,10 +226,10 @@ def test_written_models_are_read_as_the_same_robot(mended: Robot, tmp_path: Path
 @pytest.mark.parametrize(
     ("changes", "complaint"),
     [
-        ({"armature": (-0.1, 0.0, 0.0)}, "armature=.* must not be negative"),
-        ({"damping": (float("nan"), 0.0, 0.0)}, "damping is not finite"),
-        ({"torque_constant": 0.0}, "torque_constant=0; it must be positive"),
-        ({"trunk_shift": (1.0, 2.0)}, "give x, y and z"),
+        ({"armature": (-0.1, 0.0, 0.0)}, r"armature\[0\]=-0\.1; give a number from 0 to 1000"),
+        ({"damping": (float("nan"), 0.0, 0.0)}, r"damping\[0\]=nan; give a number from 0 to 1000"),
+        ({"torque_constant": 0.0}, r"torque_constant=0\.0; give a number above 0, up to 100"),
+        ({"trunk_shift": (1.0, 2.0)}, r"trunk_shift=.* has 2 values; give numbers, 3 of them"),
     ],
 )
 def test_parameters_that_cannot_be_are_refused(changes: dict[str, Any], complaint: str) -> None:

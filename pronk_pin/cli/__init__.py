@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import sys
+import textwrap
 import warnings
 from dataclasses import replace
 from itertools import pairwise
@@ -12,7 +15,7 @@ from typing import Annotated, Any, Protocol, TextIO, Union
 import tyro
 from tyro.conf import OmitSubcommandPrefixes, subcommand
 
-from .._state import known_name
+from .._checks import known_name
 from ..compare import Results
 from ..compare.suites import SUITES, load_suite
 from ..errors import LeakyFilter, OtherMachine, PronkError
@@ -61,13 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Entry point; the exit code is 0, 1 for an error of ours or models that differ, 2 for wrong
     usage, 130 on Ctrl-C."""
     try:
-        command: _Runs = tyro.cli(
-            _commands(sys.argv[1:] if arguments is None else arguments),
-            prog="pronk-pin",
-            description="When a legged robot repeats a motion, does practice beat the model?",
-            args=arguments,
-            config=(OmitSubcommandPrefixes,),
-        )
+        command = _parsed(sys.argv[1:] if arguments is None else arguments)
         with warnings.catch_warnings():
             for category in (LeakyFilter, OtherMachine):
                 warnings.simplefilter("once", category)
@@ -79,6 +76,43 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("pronk-pin: interrupted", file=sys.stderr)
         return 130
+
+
+def _parsed(arguments: list[str]) -> _Runs:
+    """The command that the arguments ask for; wrong usage ends the program, told in one line."""
+    told = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(told):
+            command: _Runs = tyro.cli(
+                _commands(arguments),
+                prog="pronk-pin",
+                description="When a legged robot repeats a motion, does practice beat the model?",
+                args=arguments,
+                config=(OmitSubcommandPrefixes,),
+            )
+    except SystemExit:
+        if text := _in_one_line(told.getvalue()):
+            print(f"pronk-pin: {text}", file=sys.stderr)
+        raise
+    sys.stderr.write(told.getvalue())
+    return command
+
+
+_LONGEST_PART = 200
+"""Characters of a part of tyro's answer, which may list many options, that are shown."""
+
+
+def _in_one_line(framed: str) -> str:
+    """What tyro tells in a frame, or below rulers, its parts separated by semicolons."""
+    parts: list[list[str]] = [[]]
+    for line in framed.splitlines():
+        words = line.strip("│|+ ").split()
+        if line.startswith(("╭", "╰")) or set("".join(words)) <= set("─-"):
+            parts.append([])
+        else:
+            parts[-1] += words
+    told = [textwrap.shorten(" ".join(part), _LONGEST_PART, placeholder=" ...") for part in parts]
+    return "; ".join(part for part in told if part)
 
 
 def _show_warning(

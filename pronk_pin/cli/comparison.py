@@ -10,6 +10,8 @@ from typing import Annotated
 import numpy as np
 from tyro.conf import Positional, arg
 
+from .._checks import none_or, real, seed, whole
+from .._workers import worker_count
 from ..compare import (
     Experiment,
     Results,
@@ -21,6 +23,9 @@ from ..compare import (
 )
 from ..compare.changes import format_changes
 from ..compare.closing import close_loop, format_loop
+from ..compare.demand import check_demand
+from ..compare.executors import known_address
+from ..compare.explanation.explain import DRAWS, IMU_NOISE, check_learner
 from ..compare.reproduce import format_reproduction
 from ..compare.suites import load_suite
 from ..compare.words import families, format_suite, format_tables
@@ -29,8 +34,10 @@ from ..model_files import write_mjcf, write_urdf
 from ..robot import load_robot
 from ..viz import write_replay
 from ..viz.explanation_figure import write_explanation_figure
+from ..viz.gait_scenes import nearest
 from ..viz.practice import practice_programme
 from ..viz.report import write_figures, write_report
+from ..viz.style import known_format
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,11 @@ class Compare:
 
     def run(self) -> None:
         """Do it."""
+        workers = worker_count(self.workers)
+        if self.executor is None:
+            check_demand(self.experiment, workers)  # before a folder is made
+        else:
+            known_address(self.executor)
         name = "comparison" if self.suite == "default" else self.suite
         folder, world = self.folder or default_folder(name), self.experiment.world
         if world:
@@ -158,9 +170,10 @@ class Explain:
 
     def run(self) -> None:
         """Do it."""
-        if self.seed < 0:
-            raise InvalidInput(f"seed={self.seed}; give a number from 0 on")
+        self._check()
         results = Results.load(self.result)
+        if self.speed is not None:
+            nearest(results.experiment.speeds, self.speed, "speed")
         cell = results.find(controller=self.controller, scenario=self.scenario)
         strides = results.all_strides(controller=self.controller, scenario=self.scenario)
         rng = np.random.default_rng(self.seed)
@@ -175,6 +188,16 @@ class Explain:
             print(f"\nmjcf    {write_mjcf(found.mended, self.write_mjcf, notes)}")
         if self.close_loop:
             print(f"\n{format_loop(close_loop(found, strides, rng=rng))}")
+
+    def _check(self) -> None:
+        """What can be told to be wrong before anything is read."""
+        seed("seed", self.seed)
+        real("imu-noise", self.imu_noise, IMU_NOISE)
+        whole("draws", self.draws, DRAWS)
+        none_or(real, "speed", self.speed)
+        check_learner(self.controller)
+        if self.figure is not None:
+            known_format(self.figure.suffix.removeprefix("."))
 
 
 def _print_tables(results: Results) -> None:

@@ -8,17 +8,23 @@ from typing import Annotated
 
 from tyro.conf import Positional, subcommand
 
+from .._checks import whole
 from ..compare import Results
 from ..compare.gains import describe_gains, sweep_gains
-from ..compare.prediction import compare_prediction, describe_prediction, practise, stored_practice
+from ..compare.prediction import (
+    STRIDES,
+    compare_prediction,
+    describe_prediction,
+    practise,
+    stored_practice,
+)
 from ..compare.scenario import load_scenario
 from ..compare.seeding import describe_seeding, measure_seeding
 from ..compare.transfer import describe_transfers, measure_transfers
 from ..control import load_controller
-from ..errors import InvalidInput
 from ..viz.learning_figures import errors_by_seed, predicted_and_measured
 from ..viz.skill_figures import gains_figure, transfers_figure
-from ..viz.style import save_figure
+from ..viz.style import known_format, save_figure
 
 
 @dataclass(frozen=True)
@@ -47,8 +53,8 @@ class Analyze:
 
     def run(self) -> None:
         """Do it."""
-        if self.strides < 1:
-            raise InvalidInput(f"strides={self.strides}; give 1 or more")
+        whole("strides", self.strides, STRIDES)
+        known_format(self.figure.suffix.removeprefix("."))
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         if self.result is None:
             made = practise(spec, self.speed, scenario, robot=self.robot, strides=self.strides)
@@ -81,6 +87,7 @@ class Gains:
 
     def run(self) -> None:
         """Do it."""
+        known_format(self.figure.suffix.removeprefix("."))
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         table = sweep_gains(spec, self.speed, scenario, robot=self.robot)
         print(describe_gains(table))
@@ -110,6 +117,7 @@ class Transfer:
 
     def run(self) -> None:
         """Do it."""
+        known_format(self.figure.suffix.removeprefix("."))
         table = measure_transfers(
             load_controller(self.controller),
             self.speed,
@@ -139,6 +147,7 @@ class Seeding:
 
     def run(self) -> None:
         """Do it."""
+        known_format(self.figure.suffix.removeprefix("."))
         table = measure_seeding(self.speed, load_scenario(self.scenario), robot=self.robot)
         print(describe_seeding(table))
         print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from tyro.conf import Positional
 
+from .._checks import seed
 from .._urdf import mujoco_spec
-from ..errors import InvalidInput
 from ..parity import compare_models
 from ..robot import load_robot
 
@@ -39,8 +39,7 @@ class Parity:
 
     def run(self) -> int:
         """Do it; the exit code is 0 where the two are the same."""
-        if self.seed < 0:
-            raise InvalidInput(f"seed={self.seed}; give a number from 0 on")
+        seed("seed", self.seed)
         robot = load_robot(self.robot)
         parity = compare_models(
             robot,

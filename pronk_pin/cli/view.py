@@ -8,8 +8,11 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from .._checks import NOT_NEGATIVE, none_or, real, whole
 from ..compare import Results
+from ..errors import FileProblem
 from ..viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
+from ..viz.live import DURATION, known_port
 from ..viz.practice import practice_programme
 from .gaits import open_library
 
@@ -63,6 +66,11 @@ class View:
 
     def run(self) -> None:
         """Do it."""
+        known_port(self.port)
+        none_or(real, "duration", self.duration, DURATION)
+        for name in ("speed", "apex"):
+            none_or(real, name, getattr(self, name))
+        none_or(whole, "stride", self.stride, NOT_NEGATIVE)
         programme = self._programme()
         if self.html is not None:
             print(f"replay  {write_replay(programme, self.html)}")
@@ -89,6 +97,13 @@ class View:
                 scenario=self.scenario,
                 beside=self.beside,
                 stride=self.stride,
+            )
+        if self.what is not None and not self.what.exists() and self.what.suffix != ".npz":
+            raise FileProblem(
+                self.what,
+                "no such results folder or gait library",
+                "make the one with 'pronk-pin compare --folder', the other with 'pronk-pin gaits "
+                "build --output'",
             )
         return library_programme(
             open_library(self.what, self.robot, self.gait, self.base),

@@ -49,7 +49,10 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
         for joint in SHOWN
     ]
     if not rows:
-        raise InvalidInput("the two results have no world and controller in common")
+        raise InvalidInput(
+            "the two results have no world and controller in common; give two of "
+            "the same --scenarios and --controllers"
+        )
     table = pd.DataFrame(rows)
     tested = table["p"].notna().to_numpy()
     if tested.any():

@@ -132,7 +132,7 @@ def _worlds(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> 
         raise InvalidInput(
             "these strides do not tell the world they were made in; give the scenarios"
         ) from error
-    return [own, replace(own, name=f"{own.name} + 3 kg", payload=own.payload + 3.0)]
+    return [own, replace(own, name=f"{own.name}+3kg", payload=own.payload + 3.0)]
 
 
 def _begin(

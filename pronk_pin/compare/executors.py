@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.sharedctypes import Synchronized
 
+from .._checks import shown
 from .._workers import follow_parent
 from ..errors import ExecutorUnavailable, InvalidInput
 
@@ -73,6 +74,21 @@ def _begin_worker(counter: Synchronized[int]) -> None:
     follow_parent()
 
 
+def known_address(address: str) -> str:
+    """HOST:PORT of a dask scheduler, from its address "dask://HOST:PORT".
+
+    Raises:
+        InvalidInput: Not such an address.
+    """
+    kind, _, place = address.partition("://")
+    if kind != "dask" or ":" not in place:
+        raise InvalidInput(
+            f"executor {shown(address)} is not an address; give dask://HOST:PORT of a dask "
+            "scheduler"
+        )
+    return place
+
+
 @contextmanager
 def connect(address: str) -> Iterator[Crew]:
     """The workers of a dask scheduler.
@@ -85,11 +101,7 @@ def connect(address: str) -> Iterator[Crew]:
         ExecutorUnavailable: dask is not installed, nobody answers, or the workers have not got
             this version of the package.
     """
-    kind, _, place = address.partition("://")
-    if kind != "dask" or ":" not in place:
-        raise InvalidInput(
-            f"executor '{address}' is not an address; give dask://HOST:PORT of a dask scheduler"
-        )
+    place = known_address(address)
     try:
         from distributed import Client
         from distributed.scheduler import KilledWorker

@@ -16,12 +16,12 @@ import numpy as np
 import xarray as xr
 from tyro.conf import Suppress
 
-from .._state import known_name
+from .._checks import instance_of, known_name, path, real, seed, sequence_of, text
 from ..control import BASES, ControllerSpec, Skill, TorqueLibrary, load_controller, phase_grid
 from ..control.feedforward import model_feedforward
 from ..errors import InvalidInput
 from ..gait import SPEEDS, Gait, GaitLibrary, load_library
-from ..robot import Robot, load_robot
+from ..robot import ROBOTS, Robot, load_robot
 from .definition import cell_definition, define, fingerprint, to_text
 from .explanation import explain, mended_gaits
 from .metrics import steady
@@ -70,8 +70,7 @@ class Experiment:
     batches: Annotated[tuple[tuple[float, ...], ...], Suppress] = ()
 
     def __post_init__(self) -> None:
-        load_robot(self.robot)
-        known_name("base", self.base, BASES)
+        self._check_types()
         library = _gaits(self.robot, self.base)
         names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
         object.__setattr__(self, "scenarios", names)
@@ -88,8 +87,6 @@ class Experiment:
                     f"controller '{controller}' identifies the robot on the locked base; leave it "
                     "out, or use base 'locked'"
                 )
-        if min(self.seeds) < 0:
-            raise InvalidInput("seeds must not be negative")
         if self.world:
             object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
         object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
@@ -128,6 +125,24 @@ class Experiment:
         added = tuple(speed for speed in other.speeds if speed not in self.speeds)
         batches = (*(self.batches or (self.speeds,)), added) if added else self.batches
         return dataclasses.replace(self, **more, batches=batches)
+
+    def _check_types(self) -> None:
+        known_name("robot", self.robot, ROBOTS)
+        known_name("base", self.base, BASES)
+        keep = object.__setattr__
+        for name, check, most in (
+            ("speeds", real, 1000),
+            ("controllers", text, 1000),
+            ("scenarios", text, 1000),
+            ("seeds", seed, 10_000),
+        ):
+            values: tuple[object, ...] = sequence_of(name, getattr(self, name), check, wanted=name)
+            if len(values) > most:
+                raise InvalidInput(f"{len(values)} {name}; give {most} or fewer")
+            keep(self, name, values)
+        if not isinstance(self.world, str) or self.world:
+            keep(self, "world", str(path("world", self.world)))
+        instance_of("schedule", self.schedule, Schedule)
 
     def cells(self) -> tuple[Cell, ...]:
         """The simulations, in an order in which each finds what it depends on done before it."""

@@ -17,6 +17,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from .._checks import path as known_path
+from .._state import as_robot
 from ..errors import FileProblem, InvalidInput, reading
 from ..parity import SIX_DIGITS, Parity, compare_models
 from ..robot import Robot
@@ -40,7 +42,8 @@ def mjcf_spec(robot: Robot, path: Path | str, *, actuators: bool = False) -> muj
         FileProblem: It is missing, or MuJoCo cannot read it.
         InvalidInput: It lacks a joint or has another one, or its trunk does not float.
     """
-    path = Path(path).expanduser()
+    as_robot(robot)
+    path = known_path("path", path).expanduser()
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError) as error:
@@ -116,7 +119,7 @@ def mjcf_sha256(path: Path | str) -> str:
     Raises:
         FileProblem: It cannot be read.
     """
-    path = Path(path).expanduser()
+    path = known_path("path", path).expanduser()
     try:
         others = sorted({Path(name) for name in mujoco.mju_getXMLDependencies(str(path))} - {path})
         files = [path, *(other for other in others if other.is_file())]

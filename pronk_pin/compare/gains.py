@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from .._checks import Interval, reals
 from ..control import ControllerSpec, Gains, Skill
 from ..errors import InvalidInput
 from ..gait import Gait, load_library
@@ -48,7 +49,12 @@ def sweep_gains(
         and how many `robots` there are.
     """
     if spec.law is None:
-        raise InvalidInput(f"controller '{spec.name}' does not learn; choose one that does")
+        raise InvalidInput(
+            f"controller '{spec.name}' does not learn; choose one that does, as 'ilc'"
+        )
+    speeds, shares = reals("speeds", speeds), reals("shares", shares, Interval(0, 1))
+    if not speeds or not shares:
+        raise InvalidInput("no speeds or no shares; give at least one of each")
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     practice = simulate(machine, gaits, spec, scenario, Schedule(0.5, _PRACTICE, _LEARNING))

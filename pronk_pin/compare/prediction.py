@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
+from .._checks import Interval, reals, whole
 from .._typing import Array
 from ..control import (
     ControllerSpec,
@@ -70,6 +71,10 @@ class Prediction:
         return _factor(self.rehearsed, self.measured)
 
 
+STRIDES = Interval(1, 100_000)
+"""Strides of learning that can be predicted."""
+
+
 def practise(
     spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario, *, robot: str, strides: int
 ) -> xr.Dataset:
@@ -79,6 +84,9 @@ def practise(
         InvalidInput: The controller does not learn in stance.
     """
     _law(spec)
+    speeds, strides = reals("speeds", speeds), whole("strides", strides, STRIDES)
+    if not speeds:
+        raise InvalidInput("no speeds; give at least one")
     library = load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     longest = max(gait.duration for gait in gaits)

@@ -37,12 +37,13 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from .._checks import file_name, instance_of
+from .._checks import path as known_path
 from ..errors import (
     FileProblem,
     InvalidInput,
     OtherMachine,
     PronkError,
-    UnknownName,
     cannot_write,
 )
 from ..robot import load_robot
@@ -117,7 +118,8 @@ class Results:
                 added to; or the experiment's MJCF cannot be read.
             InvalidInput: The MJCF is not of this robot.
         """
-        folder = Path(folder)
+        folder = known_path("folder", folder)
+        instance_of("experiment", experiment, Experiment)
         stored = cls.load(folder) if (folder / _CONFIG).exists() else None
         if stored is not None:
             experiment = stored._extended(experiment)
@@ -183,7 +185,7 @@ class Results:
         Raises:
             FileProblem: It is missing or damaged, or needs what is not there.
         """
-        folder = Path(folder)
+        folder = known_path("folder", folder)
         path = folder / _CONFIG
         if not path.is_file():
             raise FileProblem(folder, "not a results folder (no config.json)", _AGAIN)
@@ -387,16 +389,17 @@ class Results:
         """The cell of a controller, in the first seed and by default the first scenario.
 
         Raises:
-            UnknownName: The result does not have them.
+            InvalidInput: The result does not have them.
         """
         scenario = scenario or self.experiment.scenarios[0]
         for cell in self.experiment.cells():
             if (cell.controller, cell.scenario) == (controller, scenario):
                 return cell
-        if scenario not in self.experiment.scenarios:
-            raise UnknownName("scenario of this result", scenario, self.experiment.scenarios)
-        known = sorted({cell.controller for cell in self.experiment.cells()})
-        raise UnknownName("controller of this result", controller, known)
+        known = ", ".join(sorted({cell.controller for cell in self.experiment.cells()}))
+        raise InvalidInput(
+            f"no '{controller}' in scenario '{scenario}'; the result has the controllers {known} "
+            f"in the scenarios {', '.join(self.experiment.scenarios)}"
+        )
 
     def summarize(self) -> pd.DataFrame:
         """Compute the summary from the strides, and write summary.csv."""
@@ -549,4 +552,5 @@ DEFAULT_PARENT = "results"
 
 def default_folder(name: str = "comparison") -> Path:
     """results/<time>-<name> below the current folder."""
+    file_name("name", name)
     return Path(DEFAULT_PARENT) / f"{datetime.now():%Y%m%d-%H%M%S}-{name}"

@@ -6,7 +6,6 @@ file as bytes, so that they may sit on other machines and be killed at any momen
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 import time
@@ -21,9 +20,12 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from .._checks import instance_of, path
+from .._workers import worker_count
 from ..control import load_controller
-from ..errors import FileProblem, InvalidInput, WorkerLost
-from .executors import Crew, connect, count_steps, processes
+from ..errors import FileProblem, WorkerLost
+from .demand import check_demand
+from .executors import Crew, connect, count_steps, known_address, processes
 from .experiment import PRACTISED, Cell, Experiment, run_cell
 from .provenance import describe_run
 from .results import Results, encode
@@ -73,10 +75,14 @@ def run_experiment(
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
     """
-    workers = workers if workers is not None else os.cpu_count() or 1
-    if workers < 1:
-        raise InvalidInput(f"{workers} workers; at least one is needed")
-    folder = Path(folder)
+    instance_of("experiment", experiment, Experiment)
+    workers, folder = worker_count(workers), path("folder", folder)
+    if executor is None:
+        check_demand(experiment, workers)
+    elif isinstance(executor, str):
+        known_address(executor)
+    else:
+        instance_of("executor", executor, Executor, "an Executor, or an address dask://HOST:PORT")
     fresh = not folder.exists()
     results = Results.create(experiment, folder, resimulate=resimulate)
     try:

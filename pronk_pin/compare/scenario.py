@@ -17,20 +17,48 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from .._checks import (
+    Interval,
+    file_name,
+    instance_of,
+    keep_reals,
+    keep_vectors,
+    none_or,
+    real,
+    text,
+    whole,
+)
+from .._checks import seed as known_seed
 from ..errors import InvalidInput, UnknownName, reading
 from .mismatch import KNOWN, ROTOR
 from .sensors import Sensors
 
 Vector: TypeAlias = tuple[float, float, float]
 
-_AT_LEAST_ZERO = ("armature", "damping", "coulomb", "payload", "delay", "step_height")
-_POSITIVE = (
-    *("torque_constant", "ground_friction", "gravity", "timestep", "step_length"),
-    *("push_period", "push_duration"),
-)
-_VECTORS = ("payload_position", "com_shift", "push_impulse")
-_STEEPEST = 0.5
-"""Steepest slope [rad]; the gaits are planned on level ground."""
+_NUMBERS = {
+    "armature": Interval(0, 1, "kg m^2"),
+    "damping": Interval(0, 50, "N m s/rad"),
+    "coulomb": Interval(0, 50, "N m"),
+    "torque_constant": Interval(0, 10, above=True),
+    "full_torque_speed": Interval(0, 1000, "rad/s"),
+    "delay": Interval(0, 0.2, "s"),
+    "payload": Interval(0, 100, "kg"),
+    "ground_time_constant": Interval(0, 1, "s", above=True),
+    "ground_friction": Interval(0, 10, above=True),
+    "slope": Interval(-0.5, 0.5, "rad"),  # the gaits are planned on level ground
+    "step_height": Interval(0, 0.5, "m"),
+    "step_length": Interval(0.05, 10, "m"),  # each step is a box in the world
+    "gravity": Interval(0, 30, "m/s^2", above=True),
+    "push_period": Interval(0, 3600, "s", above=True),
+    "push_duration": Interval(0, 60, "s", above=True),
+    "timestep": Interval(1e-5, 0.01, "s"),
+}
+"""What the numbers of a world for a robot of some tens of kilograms can be."""
+_VECTORS = {
+    "payload_position": Interval(-1, 1, "m"),
+    "com_shift": Interval(-0.5, 0.5, "m"),
+    "push_impulse": Interval(-200, 200, "N s"),
+}
 
 
 @dataclass(frozen=True)
@@ -97,23 +125,20 @@ class Scenario:
     mjcf: str = ""
 
     def __post_init__(self) -> None:
-        for quantity in _AT_LEAST_ZERO:
-            if not 0.0 <= getattr(self, quantity) < math.inf:
-                raise self._wrong(f"{quantity} must not be negative, and finite")
-        for quantity in _POSITIVE:
-            if not 0.0 < getattr(self, quantity) < math.inf:
-                raise self._wrong(f"{quantity} must be positive, and finite")
-        for quantity in _VECTORS:
-            value = tuple(float(part) for part in getattr(self, quantity))
-            if len(value) != 3 or not all(map(math.isfinite, value)):
-                raise self._wrong(f"{quantity} must be three finite numbers")
-            object.__setattr__(self, quantity, value)
+        file_name("name of a scenario", self.name)
+        prefix = f"scenario '{self.name}': "
+        keep_reals(self, _NUMBERS, prefix)
+        keep_vectors(self, _VECTORS, prefix=prefix)
+        speeds = Interval(0, 1000, "rad/s", above=True)
+        no_load = none_or(real, f"{prefix}no_load_speed", self.no_load_speed, speeds)
+        object.__setattr__(self, "no_load_speed", no_load)
+        object.__setattr__(self, "seed", known_seed(f"{prefix}seed", self.seed))
+        instance_of(f"{prefix}sensors", self.sensors, Sensors)
+        text(f"{prefix}mjcf", self.mjcf)
         self._check_ground()
         self._check_motors()
         if not self.push_duration < self.push_period:
             raise self._wrong("push_duration must be shorter than push_period")
-        if self.seed < 0:
-            raise self._wrong("seed must not be negative")
 
     def to_json(self) -> str:
         """Everything in it as text; `from_json` reads it."""
@@ -137,15 +162,13 @@ class Scenario:
                 f"a ground_time_constant below two time steps ({2 * self.timestep:g} s) is "
                 "unstable; make it larger"
             )
-        if not abs(self.slope) <= _STEEPEST:
-            raise self._wrong(f"a slope beyond {_STEEPEST:g} rad is not for legs; make it flatter")
         if not self.step_height <= 0.5 * self.step_length:
             raise self._wrong("steps are at most half as high as they are long")
 
     def _check_motors(self) -> None:
         no_load = math.inf if self.no_load_speed is None else self.no_load_speed
-        if not 0.0 <= self.full_torque_speed < no_load:
-            raise self._wrong("full_torque_speed must be 0 or more, and less than no_load_speed")
+        if not self.full_torque_speed < no_load:
+            raise self._wrong("full_torque_speed must be less than no_load_speed")
         steps = self.delay / self.timestep
         if not abs(steps - round(steps)) < 1e-6:
             raise self._wrong(
@@ -207,14 +230,18 @@ def load_scenario(name: str, *, mjcf: str = "") -> Scenario:
         UnknownName: A part of it is not known.
         InvalidInput: A value is out of range, or two parts change the same thing.
     """
-    first, *rest = name.split("+")
+    first, *rest = text("scenario", name).split("+")
     scenario = _world(first)
     if scenario is None:
         scenario, rest = WORLDS["nominal"], [first, *rest]
     values = _values(name, rest)
     changes: dict[str, Any] = {}
     for part, value in values.items():
-        for attribute, changed in KNOWN[part].changes(value).items():
+        try:
+            changed_by = KNOWN[part].changes(value)
+        except InvalidInput as error:
+            raise InvalidInput(f"scenario '{name}': {error}") from error
+        for attribute, changed in changed_by.items():
             if attribute in changes:
                 raise InvalidInput(
                     f"scenario '{name}': two parts of it change {attribute}; keep one of them"
@@ -270,8 +297,8 @@ def random_scenarios(n: int, seed: int) -> tuple[Scenario, ...]:
     Raises:
         InvalidInput: n is below 1, or the seed is negative.
     """
-    if n < 1 or seed < 0:
-        raise InvalidInput(f"n={n}, seed={seed}; n must be 1 or more, and seed not negative")
+    n = whole("n", n, Interval(1, 1_000_000))
+    seed = whole("seed", seed, Interval(0, 999_999_999))  # nine digits, as in a name
     return tuple(_sample(seed, index) for index in range(n))
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from .._checks import Interval, keep_reals
 from ..errors import InvalidInput
 
 _SHORTEST = 1.0
 """Shortest practice and learning [s]: even a robot that lies on the ground finishes a stride."""
+
+_LIMITS = {
+    "startup": Interval(0, 600, "s"),
+    "practice": Interval(0, 86_400, "s"),
+    "learning": Interval(0, 86_400, "s"),
+    "scatter": Interval(0, 0.5, "rad"),  # beyond, robots fall before they begin
+}
 
 
 @dataclass(frozen=True)
@@ -29,11 +35,7 @@ class Schedule:
     scatter: float = 0.01
 
     def __post_init__(self) -> None:
-        values = (self.startup, self.practice, self.learning, self.scatter)
-        if not all(0.0 <= value < np.inf for value in values):
-            raise InvalidInput(
-                "the durations and the scatter of a schedule must be finite and not negative"
-            )
+        keep_reals(self, _LIMITS, "schedule: ")
         if self.practice + self.learning < _SHORTEST:
             raise InvalidInput(
                 f"practice and learning of {self.practice:g} + {self.learning:g} s are too short "

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from .._checks import reals
 from .._typing import Array
 from ..control import ControllerSpec, Skill, TorqueLibrary, load_controller, model_feedforward
 from ..errors import InvalidInput
@@ -47,10 +48,11 @@ def measure_seeding(
     Raises:
         InvalidInput: There are fewer than three speeds, or they do not increase.
     """
+    speeds = reals("speeds", speeds)
     if len(speeds) < 3:
         raise InvalidInput("seeding needs three speeds or more: one between two that are practised")
     if np.any(np.diff(speeds) <= 0.0):
-        raise InvalidInput("the speeds must increase")
+        raise InvalidInput("the speeds must increase; give each once, the lowest first")
     machine, gaits_ = load_robot(robot), load_library(robot)
     gaits = [gaits_.at(speed) for speed in speeds]
     specs = [load_controller(name) for name in LEARNERS]

@@ -6,9 +6,21 @@ from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
+from .._checks import NOT_NEGATIVE, Interval, instance_of, keep_reals, real, whole
 from .._typing import Array, IntArray
-from ..errors import InvalidInput
 from ..robot import NL
+
+_LIMITS = {
+    "encoder_noise": Interval(0, 1, "rad"),
+    "encoder_bias": Interval(0, 1, "rad"),
+    "rate_noise": Interval(0, 100, "rad/s"),
+    "gyro_noise": Interval(0, 100, "rad/s"),
+    "gyro_bias": Interval(0, 100, "rad/s"),
+    "accelerometer_noise": Interval(0, 1000, "m/s^2"),
+    "accelerometer_bias": Interval(0, 1000, "m/s^2"),
+    "force_noise": Interval(0, 10_000, "N"),
+}
+"""Beyond these a sensor tells nothing."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +51,7 @@ class Sensors:
     force_noise: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise InvalidInput(f"sensors: {name} must be finite and not negative")
+        keep_reals(self, _LIMITS, "sensors: ")
 
     @property
     def perfect(self) -> bool:
@@ -50,6 +60,7 @@ class Sensors:
 
     def scaled(self, factor: float) -> Sensors:
         """Sensors that are so many times as bad."""
+        factor = real("factor of the sensors", factor, NOT_NEGATIVE)
         return replace(self, **{n: factor * getattr(self, n) for n in self.__dataclass_fields__})
 
 
@@ -66,7 +77,9 @@ class SensorSuite:
     """
 
     def __init__(self, sensors: Sensors, n: int, rng: np.random.Generator) -> None:
-        self.sensors = sensors
+        instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
+        n = whole("n", n, Interval(1, 100_000))
+        self.sensors = instance_of("sensors", sensors, Sensors)
         self._streams = rng.spawn(n)
         biases = np.stack([stream.standard_normal(NL + 6) for stream in self._streams])
         self._encoder_bias = sensors.encoder_bias * biases[:, :NL]

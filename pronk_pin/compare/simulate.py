@@ -12,11 +12,14 @@ from typing import TypeAlias
 
 import numpy as np
 
+from .._checks import Interval, flag, instance_of, known_name, whole
 from .._typing import Array, IntArray
-from ..control import Controller, ControllerSpec
+from ..control import BASES, Controller, ControllerSpec
+from ..control.feedforward import known_gaits
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..robot import Robot
+from .demand import check_memory
 from .play import Player
 from .record import StrideLog
 from .scenario import Scenario
@@ -68,6 +71,14 @@ class Simulation:
         chunked: bool = True,
         threads: int = 1,
     ) -> None:
+        gaits = known_gaits(robot, gaits)
+        instance_of("scenario", scenario, Scenario, "a Scenario, as load_scenario() returns it")
+        instance_of("schedule", schedule, Schedule)
+        instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
+        threads = whole("threads", threads, Interval(high=1024))
+        flag("chunked", chunked)
+        known_name("base", base, BASES)
+        check_memory(gaits, schedule.duration)
         n, dt = len(gaits), scenario.timestep
         if threads < 1 or (threads > 1 and base != "locked"):
             raise InvalidInput("threads must be 1 or more, and 1 where the base is not locked")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .._state import known_name
+from .._checks import known_name
 from .experiment import Experiment
 from .mismatch import MISMATCHES
 from .scenario import random_scenarios

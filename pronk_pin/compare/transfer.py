@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from .._checks import reals
 from .._typing import Array
 from ..control import ControllerSpec, TorqueLibrary
 from ..errors import InvalidInput
@@ -77,8 +78,16 @@ def measure_transfers(
         known of its neighbours, for a world from a trial; and whether that was `right`: whether
         practice gains no more than the tolerance.
     """
-    if spec.law is None or len(speeds) < 3:
-        raise InvalidInput("transfers need a controller that learns, and three speeds or more")
+    speeds = reals("speeds", speeds)
+    if spec.law is None:
+        raise InvalidInput(
+            f"controller '{spec.name}' does not learn; transfers need a controller that learns, as "
+            "'ilc'"
+        )
+    if len(speeds) < 3:
+        raise InvalidInput("transfers need three speeds or more: one between two; give them")
+    if np.any(np.diff(speeds) <= 0.0):
+        raise InvalidInput("the speeds must increase; give each once, the lowest first")
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     frozen = replace(spec, law=None, flight_law=None)

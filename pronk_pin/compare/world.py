@@ -16,7 +16,8 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
-from .._state import known_name
+from .._checks import Interval, instance_of, known_name, none_or, whole
+from .._state import as_robot
 from .._typing import Array, BoolArray, IntArray
 from .._urdf import mujoco_spec
 from ..control import BASES, Gains
@@ -43,6 +44,9 @@ def build_model(
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         servo: Gains of servos at the joints, see `World`; without them torque motors.
     """
+    as_robot(robot)
+    instance_of("scenario", scenario, Scenario, "a Scenario, as load_scenario() returns it")
+    none_or(instance_of, "servo", servo, Gains)
     spec = mjcf_spec(robot, scenario.mjcf) if scenario.mjcf else mujoco_spec(robot)
     spec.option.timestep = scenario.timestep
     spec.option.gravity = scenario.gravity_vector
@@ -156,6 +160,7 @@ class World:
         base: str = "locked",
         servo: Gains | None = None,
     ) -> None:
+        n = whole("n", n, Interval(1, 100_000))
         self.robot, self.scenario, self.n = robot, scenario, n
         self.model = build_model(robot, scenario, base=base, servo=servo)
         self._models = [self.model] * n  # rollout without checks wants one a robot

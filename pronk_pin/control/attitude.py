@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._checks import SHARE, Interval, keep_reals, keep_vectors
 from .._typing import Array
-from ..errors import InvalidInput
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,10 @@ class AttitudeRegulator:
     until: float = 0.9
 
     def __post_init__(self) -> None:
-        if min(*self.stiffness, *self.damping) < 0.0 or not self.friction > 0.0:
-            raise InvalidInput(
-                "attitude regulation needs stiffness and damping that are not negative, and a "
-                "positive coefficient of friction"
-            )
+        prefix, friction = "attitude regulation: ", Interval(0, 10, above=True)
+        stiffness, damping = Interval(0, 1e5, "N m/rad"), Interval(0, 1e4, "N m s/rad")
+        keep_vectors(self, {"stiffness": stiffness, "damping": damping}, prefix=prefix)
+        keep_reals(self, {"friction": friction, "until": SHARE}, prefix)
 
     def moment(self, error: Array, rate_error: Array) -> Array:
         """Moment on the trunk [N m], world axes, shape (n, 3).

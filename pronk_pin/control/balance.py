@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .._checks import SHARE, keep_instances, keep_reals
 from .._typing import Array, IntArray
 from ..conventions import rotation_matrix
-from ..errors import InvalidInput
 from ..gait import Gait
 from ..inverse_dynamics.distribution import distribute_wrench
 from ..kinematics.legs import contact_points, leg_geometry
@@ -48,10 +48,8 @@ class BalanceSpec:
     landing: float = 0.3
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.learned <= 1.0 and 0.0 <= self.landing <= 1.0):
-            raise InvalidInput(
-                "the shares of the attitude and of the landing that the legs learn lie in [0, 1]"
-            )
+        keep_instances(self, "balance: ", attitude=AttitudeRegulator, placement=FootPlacement)
+        keep_reals(self, {"learned": SHARE, "landing": SHARE}, "balance: ")
 
 
 class Balance:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._checks import SHARE, Interval, keep_reals
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 
@@ -49,13 +50,14 @@ class ContactDetector:
     least: float = 0.5
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.liftoff <= self.touchdown < np.inf:
+        load = Interval(0, 100, above=True)
+        checks = {"touchdown": load, "liftoff": load, "longest": SHARE, "least": SHARE}
+        keep_reals(self, checks, "contact detection: ")
+        if not self.liftoff <= self.touchdown:
             raise InvalidInput(
-                f"contact detection needs 0 < liftoff <= touchdown, as shares of the weight; got "
+                f"contact detection needs liftoff <= touchdown, as shares of the weight; got "
                 f"{self.liftoff:g} and {self.touchdown:g}"
             )
-        if not (0.0 <= self.longest <= 1.0 and 0.0 <= self.least <= 1.0):
-            raise InvalidInput("longest and least are shares of the stance, from 0 to 1")
 
     def contact(self, load: Array) -> BoolArray:
         """Whether there is contact, at each tick; none before the first.

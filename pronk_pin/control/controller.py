@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._state import known_name
+from .._checks import Interval, instance_of, known_name, real
+from .._state import as_array, as_numbers
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait
@@ -19,10 +20,10 @@ from ..robot import NL, Robot
 from .balance import Balance
 from .controller_spec import ControllerSpec
 from .estimation import SpeedEstimator
-from .feedforward import BASES
+from .feedforward import BASES, known_gaits
 from .filters import ZeroPhaseFilter
 from .guided_strides import Settings
-from .learning import SKIPPED, anti_windup, given
+from .learning import SKIPPED, anti_windup, given, learned_by
 from .linearise import lifted_model
 from .model_based import ModelBasedILC
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
@@ -36,6 +37,10 @@ LATEST_TOUCHDOWN = 2.0
 
 _LATE_TOUCHDOWN = 1.2
 """The tape of a flight is so many times as long as its reference, beyond which it is held."""
+
+
+TIMESTEP = Interval(1e-5, 0.01, "s")
+"""Time steps of the control that make sense."""
 
 
 class Controller:
@@ -63,16 +68,24 @@ class Controller:
         flight: Array | None = None,
         base: str = "locked",
     ) -> None:
+        gaits = known_gaits(robot, gaits)
+        instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
+        timestep = real("timestep", timestep, TIMESTEP)
         n = len(gaits)
         known_name("base", base, BASES)
         shape = (n, len(PARTS), SAMPLES, NL)
-        if feedforward is None:
-            feedforward = np.zeros(shape)
+        feedforward = (
+            np.zeros(shape) if feedforward is None else as_numbers("feedforward", feedforward)
+        )
+        if flight is not None:
+            flight = as_array("flight", flight, n, ())
         if feedforward.shape != shape:
             raise InvalidInput(
                 f"a feedforward of shape {feedforward.shape}; expected {shape}: "
                 "torques on the phase grids of stance and flight for each gait"
             )
+        if not np.isfinite(feedforward).all():
+            raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
         self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
         self.feedforward = feedforward.copy()
         self._timestep = timestep
@@ -271,7 +284,7 @@ class Controller:
         for part, law in enumerate(self._laws):
             if law is not None and rows.size:
                 record = self._last[part].take(rows)
-                learned = law.update(self._told(part, rows, record))
+                learned = learned_by(law, self._told(part, rows, record), self.spec.name)
                 self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
 
     def _told(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:

@@ -4,13 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from .._state import known_name
-from ..errors import InvalidInput
+from .._checks import (
+    Interval,
+    file_name,
+    flag,
+    instance_of,
+    keep_instances,
+    keep_reals,
+    known_name,
+    whole,
+)
 from .balance import BalanceSpec
 from .contacts import ContactDetector
-from .estimation import AttitudeFilter
+from .estimation import SPEED_FILTER, AttitudeFilter
 from .filters import ZeroPhaseFilter
-from .learning import CurrentIterationILC, LearningLaw, PaperILC, PDTypeILC, StrideSelection
+from .learning import (
+    CurrentIterationILC,
+    LearningLaw,
+    PaperILC,
+    PDTypeILC,
+    StrideSelection,
+    known_law,
+)
 from .model_based import NormOptimalILC
 from .reference import FlightTiming
 from .regulation import LegAngleRegulator
@@ -63,9 +78,28 @@ class ControllerSpec:
     touchdown_ticks: int = 2
 
     def __post_init__(self) -> None:
+        file_name("name of a controller", self.name)
+        prefix = f"controller '{self.name}': "
         known_name("source of feedforward", self.source, SOURCES)
-        if self.touchdown_ticks < 1:
-            raise InvalidInput("touchdown_ticks must be 1 or more: contacts are sensed a tick late")
+        for name in ("mended_gaits", "imu"):
+            flag(prefix + name, getattr(self, name))
+        for name in ("law", "flight_law"):
+            known_law(prefix + name, getattr(self, name))
+        if self.timing is not None:
+            instance_of(f"{prefix}timing", self.timing, FlightTiming, "a FlightTiming, or None")
+        keep_instances(
+            self,
+            prefix,
+            gains=Gains,
+            regulator=LegAngleRegulator,
+            balance=BalanceSpec,
+            selection=StrideSelection,
+            contact=ContactDetector,
+            attitude_filter=AttitudeFilter,
+        )
+        keep_reals(self, {"speed_filter": SPEED_FILTER}, prefix)
+        # Contacts are sensed a tick late.
+        whole(f"{prefix}touchdown_ticks", self.touchdown_ticks, Interval(1, 50))
 
     @property
     def laws(self) -> tuple[LearningLaw | None, ...]:

@@ -14,13 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .._checks import Interval, keep_reals, real
 from .._typing import Array, IntArray
 from ..conventions import rotation_matrix
-from ..errors import InvalidInput
 from ..kinematics import leg_odometry
 from ..robot import Robot
 from .filters import first_order
 from .record import PhaseLog
+
+SPEED_FILTER = Interval(0, 10, "s")
+"""Time constants that a filter of the speed can have."""
 
 
 class SpeedEstimator:
@@ -32,8 +35,7 @@ class SpeedEstimator:
     """
 
     def __init__(self, robot: Robot, n: int, *, time_constant: float, timestep: float) -> None:
-        if time_constant < 0.0:
-            raise InvalidInput("the time constant of the speed filter must not be negative")
+        time_constant = real("speed filter: time_constant", time_constant, SPEED_FILTER)
         self._robot, self._time_constant, self._timestep = robot, time_constant, timestep
         self.speed, self.sideways = np.zeros((2, n))
 
@@ -103,8 +105,8 @@ class AttitudeFilter:
     rest: float = 2.0
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.gain < np.inf and 0.0 < self.rest < np.inf):
-            raise InvalidInput("an attitude filter needs a gain >= 0 and a rest > 0")
+        checks = {"gain": Interval(0, 100, "1/s"), "rest": Interval(0, 600, "s", above=True)}
+        keep_reals(self, checks, "attitude filter: ")
 
 
 class AttitudeEstimator:

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._state import known_name
+from .._checks import instance_of, known_name, sequence_of
+from .._state import as_robot
 from .._typing import Array
+from ..errors import InvalidInput
 from ..gait import Gait
 from ..inverse_dynamics import SAGITTAL_GUIDE, feedforward
 from ..robot import Robot
@@ -22,6 +24,29 @@ GUIDES: dict[str, tuple[str, ...] | None] = {
 
 BASES = tuple(GUIDES)
 """How a trunk may move."""
+
+
+def known_gaits(robot: Robot, gaits: Sequence[Gait]) -> tuple[Gait, ...]:
+    """Gaits of a robot, one or more.
+
+    Raises:
+        InvalidInput: There is none, or one is no gait, or of another robot.
+    """
+    as_robot(robot)
+    if isinstance(gaits, Gait):
+        raise InvalidInput("gaits is one Gait; give a list, with a gait for each robot")
+    found = sequence_of(
+        "gaits", gaits, lambda name, gait: instance_of(name, gait, Gait), wanted="gaits"
+    )
+    if not found:
+        raise InvalidInput("gaits is empty; give one for each robot")
+    for gait in found:
+        if gait.robot != robot.name:
+            raise InvalidInput(
+                f"a gait of the {gait.robot} cannot be played by the {robot.name}; take it from "
+                f"load_library('{robot.name}')"
+            )
+    return found
 
 
 def model_feedforward(
@@ -39,6 +64,7 @@ def model_feedforward(
     Raises:
         UnknownName: There is no such base; see `BASES`.
     """
+    gaits = known_gaits(robot, gaits)
     guide = GUIDES[known_name("base", base, BASES)]
     found = [
         feedforward(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
+from .._checks import Interval, real, reals, shown, whole
 from .._typing import Array
 from ..errors import InvalidInput, LeakyFilter
 from .record import resample
@@ -34,6 +35,14 @@ class ZeroPhaseFilter:
     a: tuple[float, ...]
 
     def __post_init__(self) -> None:
+        for name in ("b", "a"):
+            values = reals(f"filter: {name}", getattr(self, name))
+            object.__setattr__(self, name, values)
+            if not values or (name == "a" and values[0] == 0.0):
+                raise InvalidInput(
+                    f"filter: {name}={shown(values)}; give one coefficient or more, the first of "
+                    "a not 0"
+                )
         if np.max(np.abs(np.roots(self.a)), initial=0.0) >= 1.0:
             raise InvalidInput("the filter is unstable; its poles must lie inside the unit circle")
 
@@ -56,6 +65,8 @@ class ZeroPhaseFilter:
         Raises:
             InvalidInput: The order is below 1, or the cut-off not between 0 and 1.
         """
+        order = whole("order", order, Interval(high=20))
+        cutoff = real("cutoff", cutoff)
         if order < 1 or not 0.0 < cutoff < 1.0:
             raise InvalidInput(
                 f"a Butterworth filter of order {order} and cut-off {cutoff:g}; give an order of 1 "

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._checks import instance_of
+from .._state import as_robot
 from .._typing import Array
 from ..errors import InvalidInput
 from ..gait import Gait
@@ -72,6 +74,10 @@ class GuidedStrides:
     """
 
     def __init__(self, robot: Robot, gait: Gait, settings: Settings, rotors: Rotors) -> None:
+        as_robot(robot)
+        instance_of("gait", gait, Gait)
+        instance_of("settings", settings, Settings)
+        instance_of("rotors", rotors, Rotors)
         self.robot, self.gait, self.settings, self.rotors = robot, gait, settings, rotors
         gains, dt = settings.gains, settings.timestep
         self.kp, self.kd = gains.proportional, gains.derivative

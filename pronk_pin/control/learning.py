@@ -5,11 +5,13 @@ A law is a function with parameters and no state: what was learned so far is in 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
+from .._checks import SHARE, Interval, instance_of, keep_reals, shown
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, look_ahead
@@ -46,6 +48,14 @@ class StrideSelection:
     shortest: float = 0.7
     longest: float = 1.4
     tilt: float = 0.15
+
+    def __post_init__(self) -> None:
+        checks = {
+            "shortest": Interval(0, 1),
+            "longest": Interval(1, 100),
+            "tilt": Interval(0, np.pi, "rad"),
+        }
+        keep_reals(self, checks, "stride selection: ")
 
     def skipped(self, record: StrideRecord) -> IntArray:
         """Why the robots' strides are not, as an index into `SKIPPED`, shape (n,)."""
@@ -98,6 +108,60 @@ _CUT = 1e-9
 """Product of torques [(N m)^2] below which a motor did not cut anything off."""
 
 
+_GAIN = Interval(0, 2, below=True)
+_DELTA = Interval(0, 1, below=True)
+
+
+def _check_parts(law: str, owner: PDTypeILC | PaperILC | CurrentIterationILC) -> None:
+    """The gains and the filter of a law."""
+    if not isinstance(owner, CurrentIterationILC):
+        instance_of(f"{law}: gains", owner.gains, Gains)
+    if not callable(owner.filter):
+        raise InvalidInput(
+            f"{law}: filter={shown(owner.filter)} is no filter; give a ZeroPhaseFilter, or a "
+            "function of an array (n, samples, 12)"
+        )
+
+
+def known_law(name: str, law: object) -> LearningLaw | None:
+    """A learning law, or None.
+
+    Raises:
+        InvalidInput: It is neither.
+    """
+    # Dictionaries and sets have an `update` too.
+    other = isinstance(law, type | Mapping | set) or not callable(getattr(law, "update", None))
+    if law is not None and other:
+        raise InvalidInput(
+            f"{name}={shown(law)} is no learning law; give an object with update(record), such as "
+            "PDTypeILC(), or None"
+        )
+    return law  # type: ignore[return-value]
+
+
+def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array:
+    """What a law makes of a stride's record [N m], shape (n, samples, 12).
+
+    Raises:
+        InvalidInput: It answers something else, or what is not finite.
+    """
+    answer, wanted = law.update(record), record.feedforward.shape
+    name = f"the law {type(law).__name__} of controller '{controller}'"
+    if not isinstance(answer, np.ndarray) or answer.shape != wanted:
+        shape = getattr(answer, "shape", None)
+        what = shown(answer) if shape is None else f"an array of shape {shape}"
+        raise InvalidInput(
+            f"{name} answered {what} where {wanted} is expected; let its update(record) return an "
+            "array of the shape of record.feedforward"
+        )
+    if answer.dtype.kind not in "iuf" or not np.isfinite(answer).all():
+        raise InvalidInput(
+            f"{name} answered torques that are not finite numbers; let its update(record) return "
+            "finite ones, as record.error and record.feedforward are"
+        )
+    return answer
+
+
 @dataclass(frozen=True)
 class PDTypeILC:
     """PD-type law on a memory that holds the feedforward only, with forgetting.
@@ -122,11 +186,8 @@ class PDTypeILC:
     filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.08))
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.gain < 2.0 and 0.0 <= self.leak <= 1.0 and 0.0 <= self.delta < 1.0):
-            raise InvalidInput(
-                "a PD-type law needs gain in [0, 2), leak in [0, 1] and delta in [0, 1); "
-                f"got {self.gain:g}, {self.leak:g}, {self.delta:g}"
-            )
+        keep_reals(self, {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}, "a PD-type law: ")
+        _check_parts("a PD-type law", self)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -150,6 +211,10 @@ class PaperILC:
     delta: float = 0.06
     gains: Gains = field(default_factory=Gains)
     filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter(PAPER_B, PAPER_A))
+
+    def __post_init__(self) -> None:
+        keep_reals(self, {"delta": _DELTA}, "the paper's law: ")
+        _check_parts("the paper's law", self)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -180,11 +245,9 @@ class CurrentIterationILC:
     filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.04))
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.gain < 2.0 and 0.0 <= self.leak <= 1.0 and 0.0 <= self.delta < 1.0):
-            raise InvalidInput(
-                "a current-iteration law needs gain in [0, 2), leak in [0, 1] and delta in [0, 1); "
-                f"got {self.gain:g}, {self.leak:g}, {self.delta:g}"
-            )
+        checks = {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}
+        keep_reals(self, checks, "a current-iteration law: ")
+        _check_parts("a current-iteration law", self)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
+from .._checks import SHARE, Interval, keep_reals, none_or, whole
 from .._typing import Array
 from ..errors import InvalidInput
 from .lifted import LiftedModel
@@ -72,11 +73,9 @@ class ModelBasedILC:
     answers: tuple[Answers, ...] = field(default=(), repr=False, compare=False, kw_only=True)
 
     def __post_init__(self) -> None:
-        if self.horizon < 1 or (self.splines is not None and self.splines <= _DEGREE):
-            raise InvalidInput(
-                f"a model-based law needs horizon >= 1 and splines > {_DEGREE} (or None); "
-                f"got {self.horizon}, {self.splines}"
-            )
+        prefix = "a model-based law: "
+        whole(f"{prefix}horizon", self.horizon, Interval(1, 100))
+        none_or(whole, f"{prefix}splines", self.splines, Interval(_DEGREE + 1, 1000))
 
     def along(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
         """The law for robots of these models, in the order of `StrideRecord.robot`."""
@@ -127,11 +126,12 @@ class PlantInversionILC(ModelBasedILC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (0.0 <= self.gain < 2.0 and 0.0 < self.cutoff < 1.0 and 0.0 <= self.leak <= 1.0):
-            raise InvalidInput(
-                "plant inversion needs gain in [0, 2), cutoff in (0, 1) and leak in [0, 1]; "
-                f"got {self.gain:g}, {self.cutoff:g}, {self.leak:g}"
-            )
+        checks = {
+            "gain": Interval(0, 2, below=True),
+            "cutoff": Interval(0, 1, above=True, below=True),
+            "leak": SHARE,
+        }
+        keep_reals(self, checks, "plant inversion: ")
 
     def along(self, models: Sequence[LiftedModel]) -> PlantInversionILC:
         """See `ModelBasedILC.along`."""
@@ -167,9 +167,11 @@ class NormOptimalILC(ModelBasedILC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (self.change >= 0.0 and self.effort >= 0.0 and self.change + self.effort > 0.0):
+        weight = Interval(0, 1e12, "rad^2/(N m)^2")
+        keep_reals(self, {"change": weight, "effort": weight}, "a norm-optimal law: ")
+        if not self.change + self.effort > 0.0:
             raise InvalidInput(
-                "a norm-optimal law needs weights that are not negative, and one that is positive; "
+                "a norm-optimal law needs one weight that is positive; "
                 f"got change={self.change:g}, effort={self.effort:g}"
             )
 

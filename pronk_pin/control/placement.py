@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._checks import Interval, keep_reals
 from .._typing import Array
-from ..errors import InvalidInput
 from ..kinematics.legs import LegGeometry, leg_angles, leg_motion
 
 
@@ -29,8 +29,12 @@ class FootPlacement:
     settled: float = 0.7
 
     def __post_init__(self) -> None:
-        if self.limit < 0.0 or not 0.0 < self.settled <= 1.0:
-            raise InvalidInput("foot placement needs limit >= 0 and settled in (0, 1]")
+        checks = {
+            "gain": Interval(-10, 10, "s"),
+            "limit": Interval(0, 1, "m"),
+            "settled": Interval(0, 1, above=True),
+        }
+        keep_reals(self, checks, "foot placement: ")
 
     def aside(self, speed: Array) -> Array:
         """Sideways displacement of the feet [m] for a speed sideways [m/s], shape (n,)."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from .._checks import Interval, whole
 from .._typing import Array, BoolArray, IntArray
 from ..robot import NL
 
@@ -188,7 +189,7 @@ def held(values: Array) -> Array:
 
 def phase_grid(samples: int = SAMPLES) -> Array:
     """Phases of the grid, shape (samples,)."""
-    return np.linspace(0.0, 1.0, samples)
+    return np.linspace(0.0, 1.0, whole("samples", samples, Interval(2, 100_000)))
 
 
 def resample(values: Array, position: Array) -> Array:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._checks import SHARE, Interval, keep_reals
 from .._typing import Array, IntArray
-from ..errors import InvalidInput
 from ..gait import GaitPhase
 
 _NOTICED = 2e-5
@@ -32,8 +32,8 @@ class FlightTiming:
     limit: float = 0.15
 
     def __post_init__(self) -> None:
-        if not (0.0 <= self.gain <= 1.0 and 0.0 <= self.limit < 1.0):
-            raise InvalidInput("a flight's timing needs a gain in [0, 1] and a limit in [0, 1)")
+        checks = {"gain": SHARE, "limit": Interval(0, 1, below=True)}
+        keep_reals(self, checks, "a flight's timing: ")
 
     def next(self, duration: Array, measured: Array, planned: Array) -> Array:
         """The next flight's duration from that of the reference, of the flight, and of the gait."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .._checks import Interval, keep_reals
 from .._typing import Array
-from ..errors import InvalidInput
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,12 @@ class LegAngleRegulator:
     settled: float = 0.7
 
     def __post_init__(self) -> None:
-        if self.limit < 0.0 or not 0.0 < self.settled <= 1.0:
-            raise InvalidInput("leg-angle regulation needs limit >= 0 and settled in (0, 1]")
+        checks = {
+            "gain": Interval(-10, 10, "rad s/m"),
+            "limit": Interval(0, 1.5, "rad"),
+            "settled": Interval(0, 1, above=True),
+        }
+        keep_reals(self, checks, "leg-angle regulation: ")
 
     def turn(self, speed_error: Array) -> Array:
         """Change of the leg angle [rad] for speed minus desired speed [m/s], shape (n,)."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .._checks import Interval, keep_vectors
 from .._typing import Array, IntArray
-from ..errors import InvalidInput
 from ..robot import NL
 
 
@@ -29,8 +29,8 @@ class Gains:
     kd: tuple[float, float, float] = (1.0, 6.0, 2.0)
 
     def __post_init__(self) -> None:
-        if min(*self.kp, *self.kd) < 0.0:
-            raise InvalidInput("feedback gains must not be negative")
+        proportional, derivative = Interval(0, 1e5, "N m/rad"), Interval(0, 1e4, "N m s/rad")
+        keep_vectors(self, {"kp": proportional, "kd": derivative}, prefix="feedback gains: ")
 
     @property
     def proportional(self) -> Array:

@@ -9,8 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._checks import numbers
+from .._checks import path as known_path
 from .._typing import Array, BoolArray
 from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
+from ..robot import NL
 from .record import resample
 
 SCHEMA = 2
@@ -50,6 +53,14 @@ class TorqueLibrary:
     flight: Array
 
     def __post_init__(self) -> None:
+        given = {name: getattr(self, name) for name in ("speeds", "torque", "spread", "flight")}
+        for name, array in zip(given, numbers(**given), strict=True):
+            object.__setattr__(self, name, array)
+        if self.speeds.ndim != 1 or self.torque.ndim != 4 or self.flight.ndim != 1:
+            raise InvalidInput(
+                f"speeds, torque and flight of the shapes {self.speeds.shape}, {self.torque.shape} "
+                f"and {self.flight.shape}; give (n,), (n, 2, samples, {NL}) and (n,)"
+            )
         lengths = {len(part) for part in (self.torque, self.speeds, self.flight)}
         if self.torque.shape != self.spread.shape or len(lengths) > 1:
             raise InvalidInput(
@@ -167,7 +178,7 @@ class TorqueLibrary:
         Raises:
             FileProblem: The file is missing or damaged.
         """
-        path = Path(path)
+        path = known_path("path", path)
         if not path.is_file():
             raise FileProblem(path, "missing", _AGAIN)
         try:

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from .._state import as_array, as_one, as_state, leg_indices
+from .._checks import SHARE, real
+from .._state import as_array, as_one, as_robot, as_state, leg_indices
 from .._typing import Array
-from ..errors import InvalidInput
 from ..kinematics.contacts import Contact, bias_at, contact_radius, jacobian_at
 from ..robot import NB, Robot
 from .stance import (
@@ -50,7 +50,7 @@ def flight_dynamics(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.A
     Raises:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
     """
-    if np.ndim(tau) == 1 and robot.parameters.ideal_motors:
+    if np.ndim(tau) == 1 and as_robot(robot).parameters.ideal_motors:
         force = np.zeros(robot.nv)
         force[NB:] = as_array("tau", tau, robot.nu, ())
         quick = quick_result(pin.aba, robot, 0, q, v, force)
@@ -179,8 +179,7 @@ def impact(
             outside [0, 1].
         UnknownName: There is no such leg or contact.
     """
-    if not 0.0 <= restitution <= 1.0:
-        raise InvalidInput(f"restitution={restitution}; choose a number from 0 to 1")
+    restitution = real("restitution", restitution, SHARE)
     legs, radius = leg_indices(robot, feet), contact_radius(robot, contact)
     if legs and radius == 0.0:
         quick = point_stance(robot, legs).quick_impact(q, v, restitution)

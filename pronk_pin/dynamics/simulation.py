@@ -12,6 +12,7 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
+from .._checks import Interval, real, whole
 from .._state import as_array, as_one, as_state, leg_indices
 from .._typing import Array
 from ..energetics import kinetic_energy, potential_energy
@@ -162,11 +163,9 @@ def simulate_phase(
     """
     q, v = as_state(robot, q, v)
     as_one("q", q)
-    if not 0.0 < duration < np.inf or samples < 2 or not 0.0 < tolerance < 1.0:
-        raise InvalidInput(
-            f"duration={duration}, samples={samples}, tolerance={tolerance}; give a positive "
-            "duration, 2 samples or more, and a tolerance between 0 and 1"
-        )
+    duration = real("duration", duration, Interval(0.0, unit="s", above=True))
+    samples = whole("samples", samples, Interval(2, 1_000_000))
+    tolerance = real("tolerance", tolerance, Interval(0.0, 1.0, above=True, below=True))
     problem = _PhaseProblem(
         robot,
         tau if callable(tau) else _sampled_torque(robot, tau, duration),

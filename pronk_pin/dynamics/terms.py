@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from .._state import REFUSALS, as_one, as_q, as_state, sound_base
+from .._state import REFUSALS, as_one, as_q, as_robot, as_state, sound_base
 from .._typing import Array
 from ..robot import NB, Robot
 
@@ -67,7 +67,8 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> Array:
     """
     mass = quick_result(pin.crba, robot, _COUPLING, q)
     if mass is None:
-        mass = pin.crba(robot.model, robot.data, as_one("q", as_q(robot, q)))
+        q = as_one("q", as_q(robot, q))
+        mass = pin.crba(robot.model, robot.data, q)
     return mass
 
 
@@ -118,4 +119,5 @@ def nonlinear_effects(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array
 
 def selection_matrix(robot: Robot) -> Array:
     """Selection matrix S of eq. (2), which hands the motor torques to the joints, (18, 12)."""
+    as_robot(robot)
     return np.eye(robot.nv, robot.nu, k=-NB)

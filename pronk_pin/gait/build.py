@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import importlib.metadata
 import multiprocessing
-import os
 import sys
 import tempfile
 import time
@@ -25,11 +24,15 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from .._checks import path as known_path
+from .._checks import reals
+from .._state import as_robot
 from .._typing import Array
-from .._workers import follow_parent
+from .._workers import follow_parent, worker_count
 from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
 from ..robot import Robot, RobotSpec, load_robot
 from .audit import audit, bezier_orders
+from .ballistics import check_ballistics
 from .library import DAMAGE, SCHEMA, GaitLibrary, from_arrays, to_arrays, write_arrays
 from .optimize import GaitSolution, SolverState, optimize_gait
 from .problem import Base, GaitProblem
@@ -90,13 +93,14 @@ def build_library(
     """
     began = time.perf_counter()
     style = load_style(gait)
-    speeds = style.speeds if speeds is None else speeds
-    apexes = (style.apex,) if apexes is None else apexes
-    if not len(speeds) or not len(apexes):
-        raise InvalidInput("no speeds or no heights to build gaits for; give at least one of each")
-    workers = workers if workers is not None else os.cpu_count() or 1
-    if workers < 1:
-        raise InvalidInput(f"{workers} workers; at least one is needed")
+    as_robot(robot)
+    speeds = reals("speeds", style.speeds if speeds is None else speeds)
+    apexes = reals("apex", (style.apex,) if apexes is None else apexes)
+    if not speeds or not apexes:
+        raise InvalidInput("no speeds or no apex to build gaits for; give at least one of each")
+    workers = worker_count(workers)
+    if path is not None:
+        path = known_path("path", path)
     parents = _outward(speeds, apexes, style.apex)
     with _folder(folder) as place:
         tasks = {
@@ -106,6 +110,8 @@ def build_library(
             )
             for key in parents
         }
+        for task in tasks.values():
+            check_ballistics(task.problem)
         _solve_all(tasks, parents, workers, progress, keeps=folder is not None)
         solved = {key: _read(task) for key, task in tasks.items()}
     library = _library(robot, gait, solved, tasks, _home(apexes, style.apex))
@@ -126,7 +132,7 @@ class _Task:
 @contextmanager
 def _folder(folder: Path | str | None) -> Iterator[Path]:
     if folder is not None:
-        yield Path(folder)
+        yield known_path("folder", folder)
         return
     with tempfile.TemporaryDirectory(prefix="pronk-pin-gaits-") as temporary:
         yield Path(temporary)

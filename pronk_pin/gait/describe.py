@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..errors import InvalidInput
-from .library import GaitLibrary
+from .library import GaitLibrary, known_library
 
 
 def describe_library(library: GaitLibrary) -> str:
@@ -15,8 +15,11 @@ def describe_library(library: GaitLibrary) -> str:
     Raises:
         InvalidInput: The library has no audit.
     """
+    known_library(library)
     if not library.audit:
-        raise InvalidInput("this gait library has no audit; build it with 'pronk-pin gaits build'")
+        raise InvalidInput(
+            "this gait library has no audit; build it anew with 'pronk-pin gaits build'"
+        )
     lines = [
         "  speed   apex  stride  violation  18-DoF res.  stance drift      foot  flight drift"
         "  order    Bezier  torque  velocity  friction",
@@ -47,7 +50,7 @@ def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None)
         SpeedOutOfRange: The library does not cover the speed.
         ApexOutOfRange: The library does not cover the apex.
     """
-    gait = library.at(speed, apex)
+    gait = known_library(library).at(speed, apex)
     kind = library.metadata.get("gait", "pronk")
     lines = [
         f"{gait.robot}, {kind}, {library.base} base, {gait.speed:+.3g} m/s, "

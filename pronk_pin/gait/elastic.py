@@ -35,6 +35,12 @@ DEMANDS: Mapping[str, tuple[float, str]] = {
 """What may give way: the size of it that counts as one, in its unit, and what to try. The demand
 "average speed" is kept as a distance over the stride [m]."""
 
+_ARGUMENTS = (
+    *("clearance", "stride", "sequence", "hip_limit", "pitch_limit", "trunk_height"),
+    *("velocity_use", "torque_use", "friction"),
+)
+"""What remedies name that is no option of `gaits build`, but an argument of `build_library`."""
+
 _REGULAR = 0.1
 """Weight of the gait's own cost, beside what gives way: the problem needs some curvature."""
 
@@ -116,7 +122,11 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] |
 
 def remedies(found: Mapping[str, float] | None) -> list[str]:
     """What to try, each remedy once."""
-    return list(dict.fromkeys(DEMANDS[name][1] for name in found or ()))
+    advice = list(dict.fromkeys(DEMANDS[name][1] for name in found or ()))
+    names = [item for item in _ARGUMENTS if any(item in words for words in advice)]
+    if names:
+        advice[-1] += f" (in Python: {', '.join(names)} of build_library)"
+    return advice
 
 
 def _elastic(constraint: Constraint, room: ca.SX) -> list[Constraint]:

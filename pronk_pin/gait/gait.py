@@ -13,6 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
+from .._checks import instance_of, real, text
+from .._state import as_numbers, as_robot
 from .._typing import Array
 from ..errors import InvalidInput
 from ..robot import NB, Robot
@@ -72,6 +74,18 @@ def planar_state(
     return q, v, a
 
 
+def _phases(s: Array) -> Array:
+    """Phases as numbers.
+
+    Raises:
+        InvalidInput: They are none, or not finite.
+    """
+    s = as_numbers("s", s)
+    if not np.isfinite(s).all():
+        raise InvalidInput("s holds NaN or infinite values; give phases from 0 to 1")
+    return s
+
+
 @dataclass(frozen=True)
 class GaitPhase:
     """One phase of a gait.
@@ -97,19 +111,22 @@ class GaitPhase:
 
     def joint_reference(self, s: Array) -> tuple[Array, Array]:
         """Joint angles [rad] and velocities [rad/s] at the phases s, each of shape (n, 12)."""
+        s = _phases(s)
         position = bezier.evaluate(self.joints, s)
         rate = bezier.evaluate(self.joints, s, derivative=1)
         return position, rate / self.duration
 
     def base_reference(self, s: Array) -> tuple[Array, Array]:
         """Trunk x, z, pitch [m, m, rad] and their rates at the phases s, each of shape (n, 3)."""
+        s = _phases(s)
         position = bezier.evaluate(self.base, s)
         rate = bezier.evaluate(self.base, s, derivative=1)
         return position, rate / self.duration
 
     def motion(self, robot: Robot, s: Array) -> Motion:
         """The whole-body motion at the phases s, shape (n,)."""
-        s = np.atleast_1d(np.asarray(s, dtype=float))
+        s = np.atleast_1d(_phases(s))
+        as_robot(robot)
         curves = [
             [
                 bezier.evaluate(coefficients, s, derivative=d) / self.duration**d
@@ -146,10 +163,12 @@ class Gait:
 
     def phase(self, name: str) -> GaitPhase:
         """The phase of that name."""
+        text("name of a phase", name)
         for phase in self.phases:
             if phase.name == name:
                 return phase
-        raise InvalidInput(f"the gait has no phase '{name}'")
+        known = ", ".join(phase.name for phase in self.phases)
+        raise InvalidInput(f"the gait has no phase '{name}'; choose one of: {known}")
 
     @property
     def stance(self) -> GaitPhase:
@@ -184,6 +203,12 @@ class Gait:
             other: A gait of the same phases and orders.
             weight: 0 gives this gait, 1 the other one.
         """
+
+        instance_of("other", other, Gait)
+        weight = real("weight", weight)
+        kinds = [[(phase.name, phase.joints.shape) for phase in g.phases] for g in (self, other)]
+        if kinds[0] != kinds[1]:
+            raise InvalidInput("the two gaits differ in phases or orders; blend gaits of one kind")
 
         def mix(a: float, b: float) -> float:
             return (1.0 - weight) * a + weight * b

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._checks import instance_of
 from .._typing import Array
 from ..robot import NB
 from .collocation import node_phases
@@ -17,6 +18,7 @@ def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
     Returns:
         The unknowns of the transcription, each (nodes, rows).
     """
+    instance_of("problem", problem, GaitProblem, "a GaitProblem, as gait_problem() returns it")
     robot, model = problem.robot, fold_problem(problem)
     standing = robot.standing[NB + 1 :][model.joint_rows()]
     durations = [

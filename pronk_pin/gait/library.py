@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from .._checks import instance_of, none_or, real, sequence_of
+from .._checks import path as known_path
 from .._typing import Array
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
 from ..robot import ROBOTS, Robot, load_robot
@@ -49,6 +51,13 @@ class GaitLibrary:
     apex: float = np.nan
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "gaits", _known_gaits(self.gaits))
+        instance_of("metadata", self.metadata, Mapping, "a mapping")  # type: ignore[type-abstract]
+        audits = sequence_of("audit", self.audit, lambda k, one: instance_of(k, one, Audit))
+        object.__setattr__(self, "audit", audits)
+        apex: Any = self.apex
+        if not isinstance(apex, float):  # NaN asks for the lowest
+            object.__setattr__(self, "apex", real("apex", apex))
         grid = [(apex, speed) for apex in self.apexes for speed in self.speeds]
         have = [(gait.apex, gait.speed) for gait in self.gaits]
         if not have or len(have) != len(grid) or not np.allclose(have, grid, rtol=0, atol=_SAME):
@@ -91,8 +100,9 @@ class GaitLibrary:
         Raises:
             InvalidInput: There is no such gait; the error lists the grid.
         """
+        apex = none_or(real, "apex", apex)
         row = _index(self.apexes, self.apex if apex is None else apex, "apex")
-        return row * len(self.speeds) + _index(self.speeds, speed, "speed")
+        return row * len(self.speeds) + _index(self.speeds, real("speed", speed), "speed")
 
     def at_apex(self, apex: float | None = None) -> GaitLibrary:
         """The part of the library at one apex of the grid; by default the library's own.
@@ -100,7 +110,7 @@ class GaitLibrary:
         Raises:
             InvalidInput: There is no such apex; the error lists the grid.
         """
-        height = self.apex if apex is None else apex
+        height = self.apex if apex is None else real("apex", apex)
         n, row = len(self.speeds), _index(self.apexes, height, "apex")
         part = slice(row * n, (row + 1) * n)
         metadata = {
@@ -122,7 +132,9 @@ class GaitLibrary:
             ApexOutOfRange: The library does not cover the apex.
         """
         speeds, apexes = self.speeds, self.apexes
+        speed = speed if isinstance(speed, float) else real("speed", speed)
         height = self.apex if apex is None else apex
+        height = height if isinstance(height, float) else real("apex", height)
         if not speeds[0] - _SAME <= speed <= speeds[-1] + _SAME:
             raise SpeedOutOfRange(speed, float(speeds[0]), float(speeds[-1]))
         if not apexes[0] - _SAME <= height <= apexes[-1] + _SAME:
@@ -161,7 +173,7 @@ class GaitLibrary:
         Raises:
             FileProblem: The file cannot be written.
         """
-        path = Path(path)
+        path = known_path("path", path)
         write_arrays(path, to_arrays(self))
         return path
 
@@ -180,7 +192,9 @@ class GaitLibrary:
         Raises:
             FileProblem: The file is missing, damaged, of another schema or robot, or not audited.
         """
-        path = Path(path)
+        path = known_path("path", path)
+        if robot is not None:
+            instance_of("robot", robot, Robot, "a Robot, as load_robot() returns it")
         if not path.is_file():
             raise FileProblem(path, "no such gait library", _REBUILD)
         try:
@@ -294,8 +308,26 @@ def _check_audit(path: Path, library: GaitLibrary) -> None:
             raise FileProblem(
                 path,
                 f"the gait at {gait.speed:g} m/s, apex {gait.apex:g} m, fails its audit ({failed})",
-                "see it with 'pronk-pin gaits show --library', and build it anew",
+                f"see it with 'pronk-pin gaits show --library {path}', and build it anew",
             )
+
+
+def known_library(library: GaitLibrary) -> GaitLibrary:
+    """The library itself, if it is one.
+
+    Raises:
+        InvalidInput: It is something else.
+    """
+    wanted = "a GaitLibrary, as load_library() returns it"
+    return instance_of("library", library, GaitLibrary, wanted)
+
+
+def _known_gaits(gaits: Any) -> tuple[Gait, ...]:
+    wanted = "gaits"
+    found = sequence_of("gaits", gaits, lambda k, gait: instance_of(k, gait, Gait), wanted=wanted)
+    if not found:
+        raise InvalidInput("gaits is empty; a gait library needs one gait or more")
+    return found
 
 
 def _distinct(values: Iterable[float]) -> Array:
@@ -329,7 +361,6 @@ def _blend(weighted: list[tuple[Gait, float]]) -> Gait:
     return lower.blend(upper, weight)
 
 
-@lru_cache(maxsize=8)
 def load_library(
     robot: str = "a1", *, gait: str = "pronk", base: Base | None = None
 ) -> GaitLibrary:
@@ -345,5 +376,21 @@ def load_library(
         FileProblem: None is shipped for it.
     """
     name = library_name(robot, gait, base)
+    if not (resources.files(__package__) / "data" / f"{name}.npz").is_file():
+        options = "".join(
+            f" --{option} {value}"
+            for option, value in (("robot", robot), ("gait", gait), ("base", base))
+            if value is not None
+        )
+        raise FileProblem(
+            f"{name}.npz",
+            "no such gait library is shipped",
+            f"build one with 'pronk-pin gaits build{options}', and look at it with --library",
+        )
+    return _shipped(name)
+
+
+@lru_cache(maxsize=8)
+def _shipped(name: str) -> GaitLibrary:
     with resources.as_file(resources.files(__package__) / "data" / f"{name}.npz") as path:
         return GaitLibrary.load(path)

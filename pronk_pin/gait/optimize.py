@@ -12,8 +12,10 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from .._checks import instance_of
 from .._typing import Array
 from ..errors import GaitNotFound, InvalidInput
+from .ballistics import check_ballistics
 from .checks import TOLERANCE, Audit
 from .collocation import node_phases, transcribe
 from .elastic import fights, remedies
@@ -141,6 +143,8 @@ def optimize_gait(
         GaitNotFound: The solver failed; the error names what fights and what to try.
         InvalidInput: `initial` was found on another mesh or for another contact sequence.
     """
+    instance_of("problem", problem, GaitProblem, "a GaitProblem, as gait_problem() returns it")
+    check_ballistics(problem)
     if isinstance(initial, GaitSolution):
         _check_alike(initial.problem, problem)
     found = _solve(problem, initial)
@@ -241,7 +245,10 @@ def _solve(
     if isinstance(state, SolverState):
         start = state.as_start()
         if len(state.x) != len(program.bounds["lbx"]) or len(state.lam_g) != program.size:
-            raise InvalidInput("the solver's state belongs to another kind of gait problem")
+            raise InvalidInput(
+                "the solver's state belongs to another kind of gait problem; take the state of a "
+                "solution with the same sequence, base and mesh"
+            )
     else:
         guess = vertical_hop(problem) if state is None else state
         start = {"x0": program.pack(guess)}

@@ -9,9 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from .._state import known_name
+from .._checks import Interval, instance_of, keep_reals, known_name, reals, sequence_of, text, whole
+from .._state import as_robot
 from ..dynamics import Contact
 from ..errors import InvalidInput
+from ..kinematics.contacts import CONTACTS
 from ..robot import Robot
 
 Base = Literal["locked", "sagittal"]
@@ -23,13 +25,32 @@ Pair = Literal["front", "rear"]
 PAIRS: tuple[Pair, ...] = ("front", "rear")
 
 
-def _check_range(name: str, limits: tuple[float, float]) -> None:
-    shortest, longest = limits
+_DURATION = Interval(high=10.0, unit="s")
+
+_NUMBERS = {
+    "speed": Interval(-100, 100, "m/s"),
+    "apex": Interval(0, 100, "m", above=True),
+    "friction": Interval(0, 10, above=True),
+    "torque_weight": Interval(0, 1e6, "1/(N m)^2", above=True),
+    "velocity_weight": Interval(0, 1e6, "1/(rad/s)^2"),
+    "torque_use": Interval(0, 10, above=True),
+    "velocity_use": Interval(0, 10, above=True),
+    "hip_limit": Interval(0, 3.2, "rad", above=True),
+    "pitch_limit": Interval(0, 1.5, "rad", above=True),
+    "trunk_height": Interval(0, 10, "m"),
+    "clearance": Interval(0, 1, "m"),
+}
+"""What the numbers of a problem can be; `gait.ballistics` knows more of speed and apex."""
+
+
+def _duration_range(name: str, limits: tuple[float, float]) -> tuple[float, float]:
+    shortest, longest = reals(f"{name} (shortest, longest)", limits, _DURATION, length=2)
     if not 0.0 < shortest <= longest:
         raise InvalidInput(
             f"{name} lasts from {shortest:g} to {longest:g} s; "
             "give two positive durations, the shorter one first"
         )
+    return shortest, longest
 
 
 @dataclass(frozen=True)
@@ -51,9 +72,17 @@ class ContactPhase:
     order: int
 
     def __post_init__(self) -> None:
-        _check_range(self.name, self.duration)
+        if not text("name of a phase", self.name):
+            raise InvalidInput("a phase needs a name; give one, as 'stance'")
+        keep = object.__setattr__
+        keep(self, "duration", _duration_range(self.name, self.duration))
+        keep(self, "stands", sequence_of(f"{self.name}: stands", self.stands, text))
         for pair in self.stands:
             known_name("pair of legs", pair, PAIRS)
+        for name, most in (("intervals", 1000), ("order", 60)):
+            keep(
+                self, name, whole(f"{self.name}: {name}", getattr(self, name), Interval(high=most))
+            )
         if self.intervals < 4 or self.intervals % 2:
             raise InvalidInput(
                 f"{self.intervals} mesh intervals in {self.name}; give an even number, 4 or more, "
@@ -133,18 +162,28 @@ class GaitProblem:
     clearance: float = 0.03
 
     def __post_init__(self) -> None:
+        as_robot(self.robot)
         known_name("base", self.base, ("locked", "sagittal"))
-        _check_range("stride", self.stride)
-        positive = ("friction", "torque_weight", "torque_use", "velocity_use", "hip_limit")
-        for name in (*positive, "pitch_limit"):
-            if not getattr(self, name) > 0.0:
-                raise InvalidInput(f"{name} is {getattr(self, name):g}; it must be positive")
+        known_name("contact", self.contact, CONTACTS)
+        keep_reals(self, _NUMBERS)
+        keep = object.__setattr__
+        keep(self, "stride", _duration_range("stride", self.stride))
+        phases = sequence_of(
+            "sequence", self.sequence, lambda name, phase: instance_of(name, phase, ContactPhase)
+        )
+        keep(self, "sequence", phases)
         if not self.apex > self.trunk_height:
             raise InvalidInput(
                 f"the apex, {self.apex:g} m, is not above the least trunk height, "
                 f"{self.trunk_height:g} m; raise the one or lower the other"
             )
         _check_sequence(self.sequence)
+        least, most = (sum(phase.duration[end] for phase in phases) for end in (0, 1))
+        if most < self.stride[0] or least > self.stride[1]:
+            raise InvalidInput(
+                f"the phases last {least:g} to {most:g} s together, and the stride "
+                f"{self.stride[0]:g} to {self.stride[1]:g} s; widen the one or the other"
+            )
 
     @property
     def intervals(self) -> tuple[int, ...]:
@@ -189,7 +228,9 @@ class GaitProblem:
 def _check_sequence(sequence: tuple[ContactPhase, ...]) -> None:
     names = [phase.name for phase in sequence]
     if len(set(names)) < len(names):
-        raise InvalidInput(f"two phases of the sequence {', '.join(names)} have the same name")
+        raise InvalidInput(
+            f"two phases of the sequence {', '.join(names)} have the same name; rename one"
+        )
     if all(phase.stands for phase in sequence):
         raise InvalidInput(
             "the sequence has no flight, so that no apex exists; add a phase of none"

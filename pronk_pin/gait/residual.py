@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from .._checks import Interval, instance_of, known_name, whole
+from .._state import as_robot
 from .._typing import Array
 from ..dynamics import Contact, contact_jacobian
 from ..kinematics import foot_positions
@@ -55,6 +57,10 @@ def gait_residual(
         base: How the trunk may move; what a guide holds it by is not missing.
         samples: Phases at which to look, in each phase of the gait.
     """
+    as_robot(robot)
+    instance_of("gait", gait, Gait)
+    known_name("base", base, ("locked", "sagittal"))
+    samples = whole("samples", samples, Interval(2, 100_000))
     rows = guided_rows(robot, base)
     force = moment = height = 0.0
     for phase in gait.phases:

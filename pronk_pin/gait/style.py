@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, cast, get_args
 
 import numpy as np
 
-from .._state import known_name
+from .._checks import known_name, sequence_of, shown, text
 from ..errors import InvalidInput
 from ..robot import Robot
 from .problem import BOUND, PITCHING_PRONK, PRONK, Base, ContactPhase, GaitProblem
@@ -82,14 +82,27 @@ def gait_problem(
         InvalidInput: The problem makes no sense.
     """
     style = load_style(gait)
-    base = style.base if base is None else base
+    base = style.base if base is None else known_base(base)
     given: dict[str, Any] = {
         "apex": style.apex,
         "base": base,
         "sequence": style.pitching if base == "sagittal" else style.sequence,
         "stride": style.stride,
     }
+    _check_changes(changes)
     return GaitProblem(robot, speed, **(given | changes))
+
+
+def _check_changes(changes: Mapping[str, Any]) -> None:
+    """What may be changed of a problem; the rest has an argument of its own.
+
+    Raises:
+        UnknownName: A problem has no such attribute.
+    """
+    own = ("robot", "speed", "base")
+    known = [item.name for item in fields(GaitProblem) if item.name not in own]
+    for name in changes:
+        known_name("attribute of a gait problem", name, known)
 
 
 def known_base(base: str) -> Base:
@@ -101,6 +114,10 @@ def known_base(base: str) -> Base:
     return cast(Base, known_name("base", base, get_args(Base)))
 
 
+_MOST = 1000
+"""Values that a range may have."""
+
+
 def number_range(name: str, words: Iterable[str]) -> tuple[float, ...]:
     """Numbers from words, each a number or a range A:B:STEP with both ends, increasing.
 
@@ -108,7 +125,7 @@ def number_range(name: str, words: Iterable[str]) -> tuple[float, ...]:
         InvalidInput: A word is neither.
     """
     numbers: set[float] = set()
-    for word in words:
+    for word in sequence_of(name, words, text, wanted="numbers and ranges as texts"):
         try:
             parts = [float(part) for part in word.split(":")]
         except ValueError:
@@ -123,9 +140,16 @@ def number_range(name: str, words: Iterable[str]) -> tuple[float, ...]:
             or parts[1] < parts[0]
         ):
             raise InvalidInput(
-                f"{name} '{word}' is neither a number nor a range A:B:STEP with A <= B and STEP > 0"
+                f"{name} {shown(word)} is neither a number nor a range A:B:STEP with A <= B and "
+                "STEP > 0"
             )
         first, last, step = parts
+        count = (last - first) / step + 1.0
+        if count > _MOST:
+            raise InvalidInput(
+                f"{name} {shown(word)} has {count:.3g} values; give {_MOST} or fewer, in larger "
+                "steps"
+            )
         count = int(np.floor((last - first) / step + 1e-9)) + 1
         numbers.update(np.round(first + step * np.arange(count), 9).tolist())
     return tuple(sorted(numbers))
@@ -133,7 +157,10 @@ def number_range(name: str, words: Iterable[str]) -> tuple[float, ...]:
 
 def library_name(robot: str, gait: str = "pronk", base: Base | None = None) -> str:
     """Name of a shipped library: the robot's, and what is not the default: "a1-bound", say."""
+    text("robot", robot)
     style = load_style(gait)
+    if base is not None:
+        known_base(base)
     extra = [] if gait == "pronk" else [gait]
     extra += [] if base in (None, style.base) else [str(base)]
     return "-".join([robot, *extra])

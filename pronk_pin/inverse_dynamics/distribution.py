@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 from proxsuite import proxqp
 
+from .._checks import POSITIVE, real
 from .._typing import Array
-from ..errors import InvalidInput
 from ..robot import NB
 from .qp import cone_sides
 
@@ -59,8 +59,7 @@ def distribute_wrench(arms: Array, wrench: Array, nominal: Array, *, friction: f
     Raises:
         InvalidInput: The coefficient of friction is not positive.
     """
-    if not friction > 0.0:
-        raise InvalidInput(f"friction={friction}; a coefficient of friction is positive")
+    friction = real("friction", friction, POSITIVE)
     matrix = wrench_matrix(arms)  # (n, 6, 3 feet)
     transposed = np.swapaxes(matrix, -1, -2)
     damped = matrix @ transposed + _WEIGHT * np.diag(_SCALE**-2)

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .._state import as_array, as_state, known_name, leg_indices
+from .._checks import POSITIVE, Interval, known_name, none_or, real, sequence_of, shown, text, whole
+from .._state import as_array, as_numbers, as_robot, as_state, leg_indices
 from .._typing import Array, BoolArray
 from ..errors import InvalidInput
 from ..kinematics.contacts import Contact, contact_radius
@@ -121,6 +122,8 @@ def inverse_dynamics(
     batch = q.shape[:-1]
     a = as_array("a", a, robot.nv, batch)
     legs, axes = leg_indices(robot, feet), _guide_axes(guide)
+    friction = none_or(real, "friction", friction, POSITIVE)
+    limits = _torque_limits(robot, torque_limits)
     motion = (q, v, a)
     if batch or friction is not None:
         motion = (q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), a.reshape(-1, robot.nv))
@@ -129,8 +132,8 @@ def inverse_dynamics(
     forces = conditions.solve()
     inside: BoolArray | np.bool_ = np.True_
     if friction is not None:
-        tau_max = robot.parameters.torque_constant * _torque_limits(robot, torque_limits)
-        inside = _constrain(problem, conditions, forces, _positive("friction", friction), tau_max)
+        tau_max = robot.parameters.torque_constant * limits
+        inside = _constrain(problem, conditions, forces, friction, tau_max)
     return _solution(problem, forces, inside, batch, robot.parameters.torque_constant)
 
 
@@ -163,8 +166,10 @@ def feedforward(
         InvalidInput: Fewer than two samples, or as `inverse_dynamics`.
         UnknownName: As `inverse_dynamics`.
     """
-    if samples < 2:
-        raise InvalidInput(f"samples={samples}; a phase needs at least 2")
+    samples = whole("samples", samples, Interval(2, 100_000))
+    as_robot(robot)
+    if not hasattr(gait, "stance"):  # gaits are a floor above
+        raise InvalidInput(f"gait={shown(gait)} is no Gait; take one of a library, by its at()")
     s = np.linspace(0.0, 1.0, samples)
     down, air = gait.stance.motion(robot, s), gait.flight.motion(robot, s)
     stance = inverse_dynamics(
@@ -189,24 +194,18 @@ def _guide_axes(guide: Sequence[str] | None) -> list[int]:
     """Indices of the guide's coordinates."""
     axes = [
         GUIDE_COORDINATES.index(known_name("guide coordinate", name, GUIDE_COORDINATES))
-        for name in guide or ()
+        for name in (() if guide is None else sequence_of("guide", guide, text))
     ]
     if len(set(axes)) != len(axes):
         raise InvalidInput(f"guide={guide} names a coordinate twice; name each once")
     return axes
 
 
-def _positive(name: str, value: float) -> float:
-    if not 0.0 < value < np.inf:
-        raise InvalidInput(f"{name}={value}; it must be positive and finite")
-    return float(value)
-
-
 def _torque_limits(robot: Robot, limits: npt.ArrayLike | None) -> Array:
     """Torque limits of every motor [N m], shape (12,)."""
     if limits is None:
         return robot.tau_max
-    array = np.asarray(limits, dtype=float)
+    array = as_numbers("torque_limits", limits)
     if array.shape not in ((), (robot.nu,)) or not np.all(array > 0.0):
         raise InvalidInput(f"torque_limits must be one or {robot.nu} positive numbers")
     return np.broadcast_to(array, (robot.nu,))

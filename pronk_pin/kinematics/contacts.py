@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from .._state import as_one, as_q, as_state, known_name, leg_indices
+from .._checks import known_name
+from .._state import as_one, as_q, as_state, leg_indices
 from .._typing import Array
 from ..robot import Robot
 
@@ -80,7 +81,7 @@ def contact_radius(robot: Robot, contact: str) -> float:
     Raises:
         UnknownName: There is no such contact.
     """
-    if contact == "point":
+    if isinstance(contact, str) and contact == "point":
         return 0.0
     known_name("contact", contact, CONTACTS)
     return robot.foot_radius

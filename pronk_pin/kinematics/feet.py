@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from .._state import as_array, as_q, as_state, known_name, leg_indices
+from .._checks import known_name
+from .._state import as_array, as_numbers, as_q, as_robot, as_state, leg_indices
 from .._typing import Array, BoolArray
 from ..conventions import rotation_matrix
 from ..errors import InvalidInput
@@ -112,7 +113,7 @@ def leg_inverse_kinematics(
         InvalidInput: A wrong shape or NaN, or the robot's legs have no closed form.
         UnknownName: There is no such leg, knee or hip.
     """
-    index = leg_indices(robot, [leg])[0]
+    index = leg_indices(robot, [known_name("leg", leg, as_robot(robot).legs)])[0]
     known_name("knee", knee, ("backward", "forward"))
     known_name("hip", hip, ("above", "below"))
     offsets = LegGeometry(*(part[index] for part in leg_geometry(robot)))
@@ -184,7 +185,7 @@ def leg_angle(robot: Robot, joints: npt.ArrayLike) -> Array:
     Raises:
         InvalidInput: A wrong shape or NaN.
     """
-    legs = as_array("joints", joints, robot.nu, None)
+    legs = as_array("joints", joints, as_robot(robot).nu, None)
     return legs[..., 1 :: len(JOINTS)] + 0.5 * legs[..., 2 :: len(JOINTS)]
 
 
@@ -204,10 +205,13 @@ def rotate_leg(robot: Robot, joints: npt.ArrayLike, delta: npt.ArrayLike) -> Arr
     Raises:
         InvalidInput: A wrong shape or NaN.
     """
-    turned = as_array("joints", joints, robot.nu, None).copy()
+    turned = as_array("joints", joints, as_robot(robot).nu, None).copy()
     thighs = turned[..., 1 :: len(JOINTS)]
+    turn = as_numbers("delta", delta)
+    if not np.isfinite(turn).all():
+        raise InvalidInput("delta holds NaN or infinite values; remove them first")
     try:
-        thighs += np.asarray(delta, dtype=float)
+        thighs += turn
     except ValueError as error:
         raise InvalidInput(f"delta does not fit the legs, {thighs.shape}: {error}") from error
     return turned

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import pinocchio as pin
 from proxsuite import proxqp
 
-from .._state import as_array, as_one, as_q, leg_indices
+from .._checks import POSITIVE, Interval, real, whole
+from .._state import as_array, as_numbers, as_one, as_q, leg_indices
 from .._typing import Array
-from ..errors import InvalidInput
 from ..robot import NB, Robot
 from .contacts import jacobian_at
 
@@ -98,12 +98,13 @@ def inverse_kinematics(
         UnknownName: There is no such leg.
     """
     indices = leg_indices(robot, legs)
-    targets = as_array("feet", np.reshape(feet, (-1, 3)), 3, (len(indices),))
-    if not (0.0 < base_weight < np.inf and 0.0 < tolerance < np.inf and iterations >= 1):
-        raise InvalidInput(
-            f"base_weight={base_weight}, tolerance={tolerance}, iterations={iterations}; give "
-            "positive numbers"
-        )
+    targets = as_numbers("feet", feet)
+    if targets.size % 3 == 0:
+        targets = targets.reshape(-1, 3)
+    targets = as_array("feet", targets, 3, (len(indices),))
+    base_weight = real("base_weight", base_weight, POSITIVE)
+    tolerance = real("tolerance", tolerance, POSITIVE)
+    iterations = whole("iterations", iterations, Interval(1, 1_000_000))
     q = robot.standing.copy() if initial is None else as_one("initial", as_q(robot, initial)).copy()
     pose = None
     if base is not None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import operator
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
+from .._checks import NOT_NEGATIVE, instance_of, real, whole
 from .._typing import Array
 from ..errors import FileProblem, InvalidInput, reading
 from ..robot import Robot
@@ -33,6 +33,8 @@ Model: TypeAlias = Robot | str | Path | mujoco.MjModel
 
 ROUND_OFF = 1e-9
 """Relative tolerance for models with all their digits."""
+
+_MOST_STATES = 1_000_000
 
 SIX_DIGITS = 1e-5
 """Relative tolerance for an MJCF of six significant digits, as MuJoCo writes it."""
@@ -158,17 +160,18 @@ def compare_models(
         InvalidInput: A model is not of a robot with hinges and slides, or an option is out of
             range.
     """
-    try:
-        states = operator.index(states)
-    except TypeError as error:
-        raise InvalidInput(f"states={states!r}; give a whole number") from error
+    states = whole("states", states)
     if states < 1:
         raise InvalidInput(f"states={states}; at least one is needed")
+    if states > _MOST_STATES:
+        raise InvalidInput(f"states={states}; give {_MOST_STATES} or fewer")
+    if rng is not None:
+        instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
+    if tolerance is not None:
+        tolerance = real("tolerance", tolerance, NOT_NEGATIVE)
     first, second = _read(a), _read(b)
     if tolerance is None:
         tolerance = max(ROUND_OFF, first.round_off, second.round_off)
-    if not 0.0 <= tolerance < np.inf:
-        raise InvalidInput(f"tolerance={tolerance}; give a number from 0 on, such as 1e-9")
     reason = _obstacle(first, second)
     mass = bias = jacobian = None
     if not reason:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .._checks import Interval, instance_of, none_or, real, whole
+from .._state import as_robot
 from ..errors import InvalidInput
 from ..gait import Gait, GaitLibrary
 from ..robot import Robot, load_robot
@@ -14,6 +16,9 @@ from .scene import Mark, Scene, Track
 
 SHOWN_SPEED = 0.5
 """Speed that is shown first [m/s], if none is asked for."""
+
+
+_SAMPLING = Interval(1e-4, 1, "s")
 
 
 def gait_scene(
@@ -35,6 +40,9 @@ def gait_scene(
         strides: How many strides.
         dt: Time between samples [s].
     """
+    strides, dt = whole("strides", strides, Interval(1, 1000)), real("dt", dt, _SAMPLING)
+    as_robot(robot)
+    instance_of("gait", gait, Gait)
     times, configurations, forces, torques, marks = [], [], [], [], []
     for stride in range(strides):
         begin = stride * gait.duration
@@ -84,7 +92,9 @@ def library_programme(
         SpeedOutOfRange: The library does not cover the speed.
         ApexOutOfRange: The library does not cover the apex.
     """
-    robot = load_robot(library.robot) if robot is None else robot
+    instance_of("library", library, GaitLibrary, "a GaitLibrary, as load_library() returns it")
+    speed, apex = none_or(real, "speed", speed), none_or(real, "apex", apex)
+    robot = load_robot(library.robot) if robot is None else as_robot(robot)
     kind = str(library.metadata.get("gait", "gait"))
     friction = library.metadata.get("problem", {}).get("friction")
     if speed is None:

@@ -34,6 +34,7 @@ import tornado.web
 import tornado.websocket
 from tornado.httputil import HTTPServerRequest
 
+from .._checks import Interval, none_or, real, text, whole
 from .._state import as_array, as_q
 from ..errors import InvalidInput, PortUnavailable, PronkError
 from .documents import film_blob, robot_blob, row_bytes, stream_row
@@ -75,6 +76,10 @@ _START = """\
 """
 
 
+DURATION = Interval(0, 1e6, "s", above=True)
+"""For how long a page can be shown."""
+
+
 def serve(
     shown: Scene | Programme,
     *,
@@ -100,6 +105,7 @@ def serve(
         PortUnavailable: The port is in use or forbidden.
         InvalidInput: There is no such port.
     """
+    duration = none_or(real, "duration", duration, DURATION)
     with LiveServer(shown, port=port, host=host) as server:
         ends = "Ctrl-C ends it" if duration is None else f"for {duration:g} s"
         with contextlib.suppress(KeyboardInterrupt):
@@ -380,10 +386,21 @@ def _json(value: object) -> str:
     return json.dumps(value).replace("<", "\\u003c")
 
 
-def _bind(host: str, port: int | None) -> list[socket.socket]:
-    """Sockets that listen on the port asked for, or on the first free one."""
+def known_port(port: int | None) -> int | None:
+    """A port, or None for a free one.
+
+    Raises:
+        InvalidInput: There is no such port.
+    """
+    port = none_or(whole, "port", port)
     if port is not None and not 0 <= port <= 65535:
         raise InvalidInput(f"a port is a number from 0 to 65535, not {port}")
+    return port
+
+
+def _bind(host: str, port: int | None) -> list[socket.socket]:
+    """Sockets that listen on the port asked for, or on the first free one."""
+    port, host = known_port(port), text("host", host)
     ports = PORTS if port is None else range(port, port + 1)
     for candidate in ports:
         try:

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from .._checks import instance_of, none_or, real, whole
 from .._typing import Array, BoolArray
 from ..compare import Results
 from ..compare.scenario import load_scenario
@@ -64,7 +65,8 @@ def practice_programme(
     Raises:
         InvalidInput: The result holds no such speed, controller, scenario or stride.
     """
-    experiment = results.experiment
+    speed, stride = none_or(real, "speed", speed), none_or(whole, "stride", stride)
+    experiment = instance_of("results", results, Results).experiment
     speeds, controllers = list(experiment.speeds), list(experiment.controllers)
     if controller is None:
         controller = "ilc" if "ilc" in controllers else controllers[0]
@@ -175,7 +177,9 @@ def _cut(strides: xr.Dataset, window: str) -> xr.Dataset:
     """The strides of a window of one robot."""
     count = int(strides["count"])
     if count == 0:
-        raise InvalidInput(f"no stride was finished at {float(strides['speed']):g} m/s")
+        raise InvalidInput(
+            f"no stride was finished at {float(strides['speed']):g} m/s; choose another speed"
+        )
     first = max(count - WINDOW, 0)
     if window == START:
         learning = np.flatnonzero(strides["learning"].to_numpy()[:count] == 1)

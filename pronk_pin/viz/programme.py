@@ -44,7 +44,8 @@ class Programme:
             InvalidInput: It does not.
         """
         if set(choice) != set(self.options):
-            raise InvalidInput(f"choose {', '.join(self.options) or 'nothing'}, not {[*choice]}")
+            wanted = ", ".join(self.options) or "nothing"
+            raise InvalidInput(f"choose {wanted}, not {', '.join(map(str, choice)) or 'nothing'}")
         for name, value in choice.items():
             if value not in self.options[name]:
                 known = ", ".join(self.options[name])

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
+from .._checks import path as known_path
+from .._checks import real
 from ..errors import InvalidInput, cannot_write
 from .documents import FPS, film_blob, robot_blob
 from .page import page, player_source, viewer_source
@@ -55,7 +57,7 @@ def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS
         FileProblem: The file cannot be written.
         InvalidInput: fps is not positive.
     """
-    path = Path(path)
+    path = known_path("path", path)
     html = replay_html(shown, fps=fps)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -67,8 +69,8 @@ def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS
 
 def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
     """The text of the file that `write_replay` writes."""
-    if not fps > 0.0:
-        raise InvalidInput(f"fps must be positive, not {fps}")
+    if not 0.0 < real("fps", fps) <= 1000.0:
+        raise InvalidInput(f"fps must be positive, not {fps}; and 1000 at most")
     programme = Programme.of(shown)
     first = programme.scene()
     frame = page(

@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .._checks import instance_of, none_or, real, sequence_of, shown, text
+from .._state import as_numbers, as_robot
 from .._typing import Array
 from ..errors import InvalidInput
 from ..robot import Robot
@@ -82,9 +84,10 @@ class Track:
 
     def __post_init__(self) -> None:
         for key in ("t", "q", *self.channels):
-            object.__setattr__(self, key, np.asarray(getattr(self, key), dtype=float))
-        if not self.name:
-            raise InvalidInput("a track needs a name")
+            values = as_numbers(f"track {shown(self.name)}: {key}", getattr(self, key))
+            object.__setattr__(self, key, values)
+        if not text("name of a track", self.name):
+            raise InvalidInput("a track needs a name; give one")
         if self.t.ndim != 1 or len(self.t) == 0 or np.any(np.diff(self.t) <= 0.0):
             raise InvalidInput(f"track '{self.name}': t must increase from one sample to the next")
         for key in ("t", "q"):
@@ -173,11 +176,18 @@ class Scene:
     force_window: float = 0.0
 
     def __post_init__(self) -> None:
-        names = [track.name for track in self.tracks]
+        as_robot(self.robot)
+        tracks = sequence_of(
+            "tracks", self.tracks, lambda k, track: instance_of(k, track, Track), wanted="tracks"
+        )
+        for name in ("title", "caption"):
+            text(name, getattr(self, name))
+        names = [track.name for track in tracks]
         if not names or len(set(names)) < len(names):
             raise InvalidInput(f"a scene needs tracks of different names, not {names}")
         for track in self.tracks:
             track.check(self.robot)
+        none_or(real, "friction", self.friction)
         if self.friction is not None and not 0.0 < self.friction < 10.0:
             raise InvalidInput(f"friction={self.friction}; give a positive coefficient, or None")
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._state import as_q
+from .._state import as_numbers, as_q
 from .._typing import Array
 from ..errors import InvalidInput
 from ..robot import Robot
@@ -52,7 +52,7 @@ def show(
     one = as_q(robot, q)
     if one.ndim != 1:
         raise InvalidInput(f"q has shape {one.shape}; show one posture, and play a motion")
-    lam = None if forces is None else np.asarray(forces, dtype=float)[None]
+    lam = None if forces is None else as_numbers("forces", forces)[None]
     track = Track(robot.name, np.zeros(1), one[None], forces=lam)
     scene = Scene(robot, (track,), title=title or robot.name.upper(), friction=friction)
     return _page(scene, port, open_browser)
@@ -129,7 +129,6 @@ def track_of(robot: Robot, trajectory: Any, name: str, **looks: Any) -> Track:
     if t is None or q is None:
         raise InvalidInput(f"a {type(trajectory).__name__} is no trajectory; {_LAYOUT}")
     q = as_q(robot, q)
-    t = np.asarray(t, dtype=float)
     if q.ndim != 2 or t.shape != q.shape[:1]:
         raise InvalidInput(f"t has shape {t.shape} and q {q.shape}; expected (n,), (n, {robot.nq})")
     lam, tau = _entry(trajectory, "lam"), _entry(trajectory, "tau")
@@ -145,7 +144,7 @@ def _entry(trajectory: Any, name: str) -> Array | None:
     found = (
         trajectory.get(name) if isinstance(trajectory, Mapping) else getattr(trajectory, name, None)
     )
-    return None if found is None else np.asarray(found, dtype=float)
+    return None if found is None else as_numbers(name, found)
 
 
 def _page(scene: Scene, port: int | None, open_browser: bool) -> LiveServer:

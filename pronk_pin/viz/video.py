@@ -14,6 +14,7 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
+from .._checks import flag, none_or, real, text, whole
 from ..errors import FileProblem, InvalidInput, cannot_write
 from .browser import Browser
 from .replay import write_replay
@@ -45,17 +46,21 @@ class Film:
     seconds: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("fps", "rate"):
-            if not getattr(self, name) > 0.0:
-                raise InvalidInput(f"{name} must be positive, not {getattr(self, name)}")
+        flag("plots", self.plots)
+        for name, most in (("fps", 1000.0), ("rate", 1000.0)):
+            if not 0.0 < real(name, getattr(self, name)) <= most:
+                raise InvalidInput(
+                    f"{name} must be positive, not {getattr(self, name)}; and {most:g} at most"
+                )
         for name in ("width", "height"):
-            if not 64 <= getattr(self, name) <= 4096 or getattr(self, name) % 2:
+            if not 64 <= whole(name, getattr(self, name)) <= 4096 or getattr(self, name) % 2:
                 raise InvalidInput(
                     f"{name}={getattr(self, name)}; give an even number of pixels from 64 to 4096"
                 )
-        if self.color not in ("", "error", "torque"):
+        if text("color", self.color) not in ("", "error", "torque"):
             raise InvalidInput(f"color='{self.color}'; choose error or torque, or leave it out")
-        if not self.at >= 0.0 or not (self.seconds is None or self.seconds > 0.0):
+        real("at", self.at), none_or(real, "seconds", self.seconds)
+        if self.at < 0.0 or (self.seconds is not None and self.seconds <= 0.0):
             raise InvalidInput("at must not be negative, and seconds must be positive")
 
     def times(self, duration: float) -> list[float]:

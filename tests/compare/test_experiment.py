@@ -107,7 +107,7 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
         ),
         ({"speeds": ()}, "speeds must name at least one, and none of them twice"),
         ({"controllers": ("pd", "pd")}, "controllers must name at least one, and none of them"),
-        ({"seeds": (0, -1)}, "seeds must not be negative"),
+        ({"seeds": (0, -1)}, "seeds[1]=-1; give a whole number from 0 on"),
         ({"base": "flying"}, "unknown base 'flying'; choose one of: locked, sagittal, free"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
@@ -122,7 +122,7 @@ def test_what_cannot_be_run_is_refused_in_one_line_with_the_remedy(
 
 
 def test_a_speed_that_is_not_a_number_is_refused() -> None:
-    with pytest.raises(PronkError, match="speed nan m/s is outside the gait library"):
+    with pytest.raises(PronkError, match=r"speeds\[0\]=nan; give a number that is finite"):
         Experiment(speeds=(float("nan"),))
 
 

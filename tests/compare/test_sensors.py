@@ -75,5 +75,7 @@ def test_what_a_robot_measures_does_not_depend_on_how_often_others_are_asked() -
 
 @pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
 def test_a_noise_that_cannot_be_is_refused(value: float) -> None:
-    with pytest.raises(InvalidInput, match="gyro_noise must be finite and not negative"):
+    with pytest.raises(
+        InvalidInput, match=r"sensors: gyro_noise=.*; give a number from 0 to 100 rad/s"
+    ):
         Sensors(gyro_noise=value)

@@ -159,7 +159,7 @@ def test_a_robot_below_the_height_of_its_gait_has_fallen(
 @pytest.mark.parametrize("name", ["startup", "practice", "learning", "scatter"])
 @pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
 def test_a_schedule_needs_finite_durations(name: str, value: float) -> None:
-    with pytest.raises(InvalidInput, match="must be finite and not negative"):
+    with pytest.raises(InvalidInput, match=f"schedule: {name}=.*; give a number from 0 to "):
         Schedule(**{name: value})
 
 

@@ -125,7 +125,9 @@ def test_what_a_turned_trunk_does_to_the_legs_is_learned_in_part(
 
 @pytest.mark.parametrize("wrong", [{"learned": 1.1}, {"landing": -0.1}])
 def test_a_share_that_is_learned_outside_0_to_1_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InvalidInput, match="shares"):
+    with pytest.raises(
+        InvalidInput, match=r"balance: l(earned|anding)=.*; give a number from 0 to 1"
+    ):
         BalanceSpec(**wrong)
 
 
@@ -159,5 +161,7 @@ def test_what_is_learned_from_turns_the_trunk_neither_about_x_nor_about_z(robot:
     "wrong", [{"stiffness": (-1.0, 0.0, 0.0)}, {"damping": (0.0, -1.0, 0.0)}, {"friction": 0.0}]
 )
 def test_gains_that_make_no_sense_are_refused(wrong: dict[str, object]) -> None:
-    with pytest.raises(InvalidInput, match="attitude regulation"):
+    with pytest.raises(
+        InvalidInput, match=r"attitude regulation: .*; give a number (from|above) 0"
+    ):
         AttitudeRegulator(**wrong)  # type: ignore[arg-type]

@@ -84,5 +84,5 @@ def test_ticks_behind_the_end_of_a_stance_do_not_count() -> None:
     ],
 )
 def test_a_detector_that_cannot_work_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InvalidInput, match=r"contact detection needs|shares of the stance"):
+    with pytest.raises(InvalidInput, match=r"contact detection(:.*; give a number| needs liftoff)"):
         ContactDetector(**wrong)

@@ -90,7 +90,7 @@ def test_robots_that_are_not_asked_about_keep_their_estimates(
 
 
 def test_a_negative_time_constant_is_refused(robot: Robot) -> None:
-    with pytest.raises(InvalidInput, match="must not be negative"):
+    with pytest.raises(InvalidInput, match=r"time_constant=-0\.1; give a number from 0"):
         SpeedEstimator(robot, 1, time_constant=-0.1, timestep=DT)
 
 
@@ -217,5 +217,5 @@ def test_a_reading_that_is_not_a_number_changes_nothing(broken: int) -> None:
 
 @pytest.mark.parametrize("wrong", [{"gain": -1.0}, {"gain": np.nan}, {"rest": 0.0}])
 def test_an_attitude_filter_that_makes_no_sense_is_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InvalidInput, match="attitude filter"):
+    with pytest.raises(InvalidInput, match=r"attitude filter: .*; give a number"):
         AttitudeFilter(**wrong)

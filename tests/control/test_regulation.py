@@ -42,5 +42,7 @@ def test_the_rate_of_the_turn_is_its_derivative() -> None:
 
 @pytest.mark.parametrize("settings", [{"limit": -0.1}, {"settled": 0.0}, {"settled": 1.2}])
 def test_impossible_settings_are_refused(settings: dict[str, float]) -> None:
-    with pytest.raises(InvalidInput, match="leg-angle regulation needs"):
+    with pytest.raises(
+        InvalidInput, match=r"leg-angle regulation: (limit|settled)=.*; give a number"
+    ):
         LegAngleRegulator(**settings)

@@ -152,7 +152,7 @@ def test_an_initial_solution_must_have_the_same_mesh(solution: GaitSolution) -> 
         ({"sequence": PRONK[:1]}, "no flight"),
         ({"sequence": BOUND[:2]}, "the rear legs never stand"),
         ({"sequence": (*PRONK, dataclasses.replace(PRONK[1], name="more"))}, "same feet; merge"),
-        ({"friction": 0.0}, "friction is 0; it must be positive"),
+        ({"friction": 0.0}, r"friction=0\.0; give a number above 0, up to 10"),
         ({"apex": 0.1}, "is not above the least trunk height"),
     ],
 )

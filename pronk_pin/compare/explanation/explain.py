@@ -11,6 +11,8 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from ..._checks import Interval, instance_of, known_name, real, sequence_of, shown, whole
+from ...control import CONTROLLERS
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ...parameters import ModelParameters
@@ -25,6 +27,10 @@ from .terms import TERMS, Term, parameters, truth
 
 if TYPE_CHECKING:
     from ..results import Results  # which imports the experiments, which explain
+
+IMU_NOISE = Interval(0, 1000, "m/s^2")
+DRAWS = Interval(2, 1_000_000)
+"""What the noise and the number of draws can be."""
 
 REPEATS = 0.95
 """Least repetition of a speed's strides that are explained, see `repetition`."""
@@ -124,8 +130,16 @@ def explain(
     Raises:
         InvalidInput: The base is not locked, the result has no ticks, or too few strides.
     """
+    imu_noise, draws = real("imu_noise", imu_noise, IMU_NOISE), whole("draws", draws, DRAWS)
+    parts = sequence_of("parts", parts, lambda k, part: known_name("part", part, PARTS))
+    if rng is not None:
+        instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
     if isinstance(result, xr.Dataset):
         strides = result
+    elif not callable(getattr(result, "strides", None)):
+        raise InvalidInput(
+            f"result={shown(result)} is no result; give Results.load(folder), or its strides"
+        )
     else:
         strides = result.strides(result.find(controller=controller, scenario=scenario))
     if strides.attrs.get("base", "locked") != "locked":
@@ -133,6 +147,7 @@ def explain(
             f"explain needs a locked base, not '{strides.attrs['base']}': run the comparison with "
             "--base locked"
         )
+    check_learner(str(strides.attrs.get("controller", "")))
     rng = np.random.default_rng(0) if rng is None else rng
     robot = load_robot(strides.attrs["robot"])
     recorded = recordings(strides, parts=tuple(parts), imu_noise=imu_noise, rng=rng)
@@ -164,6 +179,20 @@ def explain(
         true=_truth(strides),
         attributes={key: str(value) for key, value in strides.attrs.items()},
     )
+
+
+def check_learner(controller: str) -> None:
+    """Refuse a controller of ours in whose torques there is nothing that was learned.
+
+    Raises:
+        InvalidInput: It neither learns nor begins with what was learned.
+    """
+    spec = CONTROLLERS.get(controller)
+    if spec is not None and not any(spec.laws) and spec.source in ("none", "model"):
+        raise InvalidInput(
+            f"controller '{controller}' learns nothing that could be explained; choose one that "
+            "does, as 'ilc'"
+        )
 
 
 def _repeating(
