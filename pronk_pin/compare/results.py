@@ -24,16 +24,13 @@ import dataclasses
 import fcntl
 import json
 import os
-import tempfile
 import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import netCDF4
-import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -58,7 +55,6 @@ from ..storage import (
     read_text,
     reading,
     sealed,
-    sha256,
     write_file,
 )
 from .definition import (
@@ -70,22 +66,20 @@ from .definition import (
 )
 from .experiment import Cell, Experiment
 from .foreign import ForeignRobot, mjcf_sha256
+from .manifest import MANIFEST, Manifest, complete, no_room
 from .metrics import COLUMNS, KEYS, summarize
 from .practice import practice, rows_of_beating
 from .provenance import machine, versions
+from .strides_file import decode, encode, join_speeds
 
 SCHEMA = 4
 """Version of the layout of a results folder."""
 
-_CONFIG, _MANIFEST, _PARITY = "config.json", "manifest.json", "parity.json"
+_CONFIG, _PARITY = "config.json", "parity.json"
 _PROVENANCE, _SUMMARY = "provenance.json", "summary.csv"
 _AGAIN = "run 'pronk-pin compare' to make one"
-_ROOM = "make room, and run the same command again with --folder {folder}"
-_COMPLETE = "run 'pronk-pin compare --folder {folder}' to make it"
 _ANEW = "run 'pronk-pin compare --folder {folder} --resimulate' to make it anew"
 _OTHER = "choose another folder, or add --resimulate to simulate it again"
-_LARGEST_STRIDES = 2**33
-"""Size beyond which strides are not unpacked [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -128,11 +122,11 @@ class Results:
         if not resimulate:
             results._check_strides() if stored is None else stored._check_definition(definition)
         foreign = None
-        if experiment.world and not results._holds(_PARITY):
+        if experiment.world and not results._manifest.holds(_PARITY):
             foreign = ForeignRobot.read(load_robot(experiment.robot), experiment.world)
         results._make_folder()
         if foreign is not None:
-            results._write_listed(_PARITY, foreign.to_json())
+            results._manifest.write(_PARITY, foreign.to_json())
         config = sealed(
             {
                 "schema": SCHEMA,
@@ -233,7 +227,7 @@ class Results:
         with contextlib.suppress(OSError):
             if any((self.folder / "strides").iterdir()):
                 return
-            for name in (_CONFIG, _MANIFEST, _PARITY, _PROVENANCE, _SUMMARY):
+            for name in (_CONFIG, MANIFEST, _PARITY, _PROVENANCE, _SUMMARY):
                 (self.folder / name).unlink(missing_ok=True)
             (self.folder / "strides").rmdir()
             self.folder.rmdir()
@@ -289,7 +283,7 @@ class Results:
             return None
         path = self.folder / _PARITY
         remedy = "delete it and run the same 'pronk-pin compare --folder' again"
-        text = self._read_listed(_PARITY, remedy)
+        text = self._manifest.read(_PARITY, remedy)
         with reading(path, remedy):
             return ForeignRobot.from_json(text.decode())
 
@@ -320,7 +314,7 @@ class Results:
         path = self.path(cell)
         if not path.exists():
             return False
-        listed = self._holds(_strides_name(cell))
+        listed = self._manifest.holds(_strides_name(cell))
         self._open(cell, listed=listed).close()
         return listed  # else the run was killed before it could vouch for the file
 
@@ -331,7 +325,7 @@ class Results:
             FileProblem: The file cannot be written.
         """
         data = strides if isinstance(strides, bytes) else encode(strides)
-        self._write_listed(_strides_name(cell), data)
+        self._manifest.write(_strides_name(cell), data)
 
     def strides(self, cell: Cell, variables: Collection[str] | None = None) -> xr.Dataset:
         """The strides of a cell.
@@ -356,19 +350,13 @@ class Results:
             if (cell.controller, cell.scenario, cell.seed)
             == (first.controller, first.scenario, first.seed)
         ]
-        return _joined([self.strides(cell) for cell in cells])
+        return join_speeds([self.strides(cell) for cell in cells])
 
     def _open(self, cell: Cell, *, listed: bool = True) -> xr.Dataset:
         """A cell's file, checked against the manifest and for what it is of."""
         name, path = _strides_name(cell), self.path(cell)
-        data = self._read_listed(name, self._anew) if listed else read_bytes(path, self._anew)
-        with reading(path, self._anew):
-            store = xr.backends.NetCDF4DataStore(  # type: ignore[no-untyped-call]
-                netCDF4.Dataset(path.name, memory=data)
-            )
-            file = xr.open_dataset(store)
-            if file.nbytes > _LARGEST_STRIDES:
-                raise ValueError(f"it says that it has {file.nbytes / 1e9:.0f} GB")
+        data = self._manifest.read(name, self._anew) if listed else read_bytes(path, self._anew)
+        file = decode(data, path, self._anew)
         wanted = cell_definition(self._definition, cell)
         if file.attrs.get("fingerprint") != fingerprint(wanted):
             raise FileProblem(path, f"is of another simulation ({_told(file, wanted)})", _OTHER)
@@ -404,7 +392,7 @@ class Results:
     def summarize(self) -> pd.DataFrame:
         """Compute the summary from the strides, and write summary.csv."""
         summary = self._computed_summary()
-        self._write_listed(_SUMMARY, summary.to_csv(index=False))
+        self._manifest.write(_SUMMARY, summary.to_csv(index=False), made_of=self.strides_digest)
         return summary
 
     def _computed_summary(self) -> pd.DataFrame:
@@ -425,12 +413,12 @@ class Results:
         """
         path = self.folder / _SUMMARY
         try:
-            self._read_listed(_SUMMARY, "")
+            self._manifest.read(_SUMMARY, "")
         except FileProblem:
             return self._summary_anew()
-        remedy = f"delete it and {_COMPLETE.format(folder=self.folder)}"
-        header = read_csv(path, remedy)[0]
-        if header != COLUMNS or self._manifest().get("strides") != self._strides_digest():
+        remedy = f"delete it and {complete(self.folder)}"
+        stale = self._manifest.made_of(_SUMMARY) != self.strides_digest
+        if stale or read_csv(path, remedy)[0] != COLUMNS:
             return self._summary_anew()
         with reading(path, remedy):
             return pd.read_csv(path)
@@ -447,41 +435,16 @@ class Results:
         Raises:
             FileProblem: It cannot be written; what was there before is still there.
         """
-        return write_file(self.folder / name, contents, remedy=_ROOM.format(folder=self.folder))
+        return write_file(self.folder / name, contents, remedy=no_room(self.folder))
 
-    def _manifest(self) -> dict[str, str]:
-        """SHA-256 of the files that are vouched for, by name; and what the summary was made of."""
-        path = self.folder / _MANIFEST
-        if not path.exists():
-            return {}
-        remedy = f"delete it and {_COMPLETE.format(folder=self.folder)}"
-        return as_type(read_sealed(path, remedy).get("files"), dict[str, str], path, remedy)
+    @property
+    def _manifest(self) -> Manifest:
+        return Manifest(self.folder)
 
-    def _strides_digest(self) -> str:
+    @property
+    def strides_digest(self) -> str:
         """SHA-256 of all strides there are, as the manifest has them."""
-        files = self._manifest()
-        names = sorted(_strides_name(cell) for cell in self.experiment.cells())
-        return sha256("\n".join(files.get(name, "") for name in names))
-
-    def _holds(self, name: str) -> bool:
-        return name in self._manifest() and (self.folder / name).is_file()
-
-    def _read_listed(self, name: str, remedy: str) -> bytes:
-        """A file that is the one that was written, by the manifest."""
-        path = self.folder / name
-        data = read_bytes(path, remedy or _COMPLETE.format(folder=self.folder))
-        if self._manifest().get(name) != sha256(data):
-            raise damaged(path, "it is not the file that was written there", remedy)
-        return data
-
-    def _write_listed(self, name: str, contents: str | bytes) -> None:
-        """Write a file after its entry in the manifest: one without an entry is nobody's."""
-        data = contents.encode() if isinstance(contents, str) else contents
-        files = {**self._manifest(), name: sha256(data)}
-        if name == _SUMMARY:
-            files["strides"] = self._strides_digest()
-        self.write(_MANIFEST, sealed({"files": dict(sorted(files.items()))}))
-        self.write(name, data)
+        return self._manifest.digest([_strides_name(cell) for cell in self.experiment.cells()])
 
 
 @dataclass(frozen=True)
@@ -505,45 +468,6 @@ def _told(file: xr.Dataset, wanted: Definition) -> str:
         return differences(json.loads(text), wanted) or "its fingerprint is not its own"
     except ValueError:
         return "it does not say of which"
-
-
-def _joined(parts: Sequence[xr.Dataset]) -> xr.Dataset:
-    """The strides of several batches of speeds as one dataset, with NaN where one has fewer."""
-    if len(parts) == 1:
-        return parts[0]
-    numbered = [part.assign_coords(tick=np.arange(part.sizes["tick"])) for part in parts]
-    joined = xr.concat(
-        numbered, dim="speed", data_vars="all", join="outer", combine_attrs="drop_conflicts"
-    )
-    return joined.drop_vars("tick").sortby("speed")
-
-
-def encode(strides: xr.Dataset) -> bytes:
-    """A dataset as a NetCDF-4 file with checksums (Fletcher-32), the same bytes each time."""
-    packed = {"zlib": True, "complevel": 1, "shuffle": True, "fletcher32": True}
-    encoding = {
-        name: packed if variable.ndim > 2 else {"fletcher32": True}
-        for name, variable in strides.variables.items()
-        if variable.ndim and variable.dtype.kind in "fiub"
-    }
-    with _scratch_file() as path:
-        strides.to_netcdf(path, engine="netcdf4", encoding=encoding)
-        return path.read_bytes()
-
-
-@contextlib.contextmanager
-def _scratch_file() -> Iterator[Path]:
-    """A temporary file for a library that writes by name.
-
-    Raises:
-        FileProblem: There is no room for it.
-    """
-    try:
-        with tempfile.TemporaryDirectory(prefix="pronk_pin-") as folder:
-            yield Path(folder) / "strides.nc"
-    except (OSError, RuntimeError) as error:
-        remedy = "make room for temporary files, or set TMPDIR"
-        raise cannot_write(tempfile.gettempdir(), error, remedy) from error
 
 
 DEFAULT_PARENT = "results"

@@ -28,8 +28,9 @@ from .demand import check_demand
 from .executors import Crew, connect, count_steps, known_address, processes
 from .experiment import PRACTISED, Cell, Experiment, run_cell
 from .provenance import describe_run
-from .results import Results, encode
+from .results import Results
 from .simulate import Progress
+from .strides_file import encode
 
 LIVES = 3
 """So often the workers may be lost before the run gives up."""

@@ -141,12 +141,14 @@ class _Reader:
 
     def _strides(self, controller: str, scenario: str, speed: float) -> xr.Dataset:
         """The strides of one robot."""
-        strides = _load(self.results, controller, scenario)
+        digest = self.results.strides_digest
+        strides = _load(self.results, controller, scenario, digest)
         return strides.isel(speed=nearest(list(strides["speed"].to_numpy()), speed, "speed"))
 
 
 @lru_cache(maxsize=8)
-def _load(results: Results, controller: str, scenario: str) -> xr.Dataset:
+def _load(results: Results, controller: str, scenario: str, digest: str) -> xr.Dataset:
+    """Strides that are kept as long as the files, by their `digest`, are the same."""
     return results.all_strides(controller=controller, scenario=scenario)
 
 

@@ -27,7 +27,8 @@ from pronk_pin.compare import (
     summarize,
 )
 from pronk_pin.compare.provenance import describe_run, git_state
-from pronk_pin.compare.results import SCHEMA, encode
+from pronk_pin.compare.results import SCHEMA
+from pronk_pin.compare.strides_file import encode
 from pronk_pin.errors import FileProblem, InvalidInput
 
 

@@ -16,7 +16,7 @@ from pronk_pin import storage
 from pronk_pin.cli import main
 from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
 from pronk_pin.compare.definition import cell_definition, define, describe, differences
-from pronk_pin.compare.results import encode
+from pronk_pin.compare.strides_file import encode
 from pronk_pin.control import CONTROLLERS, ControllerSpec, PDTypeILC
 from pronk_pin.errors import FileProblem, InvalidInput, OtherMachine
 
