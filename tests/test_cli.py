@@ -50,7 +50,7 @@ def test_the_package_runs_as_a_module(
 def test_compare_writes_everything_it_names(result: Path) -> None:
     names = {path.name for path in result.iterdir()}
     assert names == {
-        *("config.json", "provenance.json", "summary.csv", "strides"),
+        *("config.json", "manifest.json", "provenance.json", "summary.csv", "strides"),
         *("report.html", "report.md", "figures", "replay.html"),
     }
     assert {path.name for path in (result / "strides").iterdir()} == {
@@ -258,7 +258,7 @@ def test_a_damaged_result_is_named(result: Path, capsys: pytest.CaptureFixture[s
         path.write_bytes(whole[: len(whole) // 2])
         message = failure(["view", str(result)], capsys)
         assert "ilc_nominal_0.nc: damaged" in message
-        assert "delete it and run" in message
+        assert "--resimulate' to make it anew" in message
         path.unlink()
         assert "ilc_nominal_0.nc: missing" in failure(["view", str(result)], capsys)
     finally:

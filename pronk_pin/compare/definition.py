@@ -20,7 +20,7 @@ from .. import __name__ as _OURS
 from ..control import load_controller
 from ..robot import load_robot
 from ..storage import sha256
-from .foreign import mjcf_sha256
+from .foreign import mjcf_sha256 as mjcf_digest
 from .scenario import load_scenario
 
 if TYPE_CHECKING:
@@ -30,17 +30,23 @@ Definition: TypeAlias = dict[str, Any]
 """Nested dictionaries, lists, strings and numbers."""
 
 
-def define(experiment: Experiment) -> Definition:
+def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definition:
     """Everything that an experiment's numbers depend on.
+
+    Args:
+        experiment: The experiment.
+        mjcf_sha256: SHA-256 of its MJCF, where that is known; by default the file is read.
 
     Raises:
         FileProblem: The experiment's MJCF cannot be read.
     """
     cells = experiment.cells()
+    if mjcf_sha256 is None:
+        mjcf_sha256 = mjcf_digest(experiment.world) if experiment.world else ""
     return {
         "robot": _robot(experiment.robot),
         "base": experiment.base,
-        "mjcf_sha256": mjcf_sha256(experiment.world) if experiment.world else "",
+        "mjcf_sha256": mjcf_sha256,
         "schedule": describe(experiment.schedule),
         "gaits": {repr(speed): experiment.gait(speed).sha256 for speed in experiment.speeds},
         "controllers": {

@@ -118,11 +118,12 @@ class Results:
         if stored is not None:
             experiment = stored._extended(experiment)
         results = cls(folder, experiment)
-        definition = define(experiment)
+        known = results.foreign if results._manifest.holds(_PARITY) else None
+        definition = define(experiment, mjcf_sha256=known.sha256 if known else None)
         if not resimulate:
             results._check_strides() if stored is None else stored._check_definition(definition)
         foreign = None
-        if experiment.world and not results._manifest.holds(_PARITY):
+        if experiment.world and known is None:
             foreign = ForeignRobot.read(load_robot(experiment.robot), experiment.world)
         results._make_folder()
         if foreign is not None:
@@ -282,7 +283,8 @@ class Results:
         if not self.experiment.world:
             return None
         path = self.folder / _PARITY
-        remedy = "delete it and run the same 'pronk-pin compare --folder' again"
+        remedy = "run the same 'pronk-pin compare --folder' again"
+        remedy = f"delete it and {remedy}" if path.exists() else remedy
         text = self._manifest.read(_PARITY, remedy)
         with reading(path, remedy):
             return ForeignRobot.from_json(text.decode())
@@ -293,7 +295,7 @@ class Results:
         Raises:
             FileProblem: It, or a file that it names, is another one now, or is gone.
         """
-        foreign = self.foreign
+        foreign = self.foreign if self._manifest.holds(_PARITY) else None
         if foreign is not None and mjcf_sha256(foreign.path) != foreign.sha256:
             raise FileProblem(
                 foreign.path,

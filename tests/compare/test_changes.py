@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import shutil
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import pytest
 
 from pronk_pin.compare import Results
 from pronk_pin.compare.changes import changes, format_changes
+from pronk_pin.compare.manifest import Manifest
 from pronk_pin.compare.metrics import COLUMNS
 from pronk_pin.errors import InvalidInput
 
@@ -85,14 +87,16 @@ def test_two_results_are_told_apart_in_words(comparison: Results, tmp_path: Path
     known = other.provenance
     known["runs"][-1]["git"] = "another commit"
     other.write_provenance(known)
+    path = folder / "summary.csv"
+    write = functools.partial(Manifest(folder).write, path.name, made_of=other.strides_digest)
+    write(path.read_bytes())
     text = format_changes(comparison, other)
     assert "seeds: 0 -> 0 1" in text
     assert "-> another commit" in text
     assert "0 of 6 mean peak errors changed beyond noise" in text
     assert "6 of them are the same to the bit." in text
-    path = folder / "summary.csv"
     table = pd.read_csv(path)
     worse = (table["controller"] == "pd") & (table["metric"] == "upright")
     table.loc[worse, "value"] = 0.0
-    path.write_text(table.to_csv(index=False))
+    write(table.to_csv(index=False))
     assert "worse (+2 fell)" in format_changes(comparison, other)

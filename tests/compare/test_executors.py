@@ -134,20 +134,23 @@ class Inline(Executor):
         return future
 
 
-def test_what_was_finished_before_the_disk_was_full_is_kept(alone: Results, tmp_path: Path) -> None:
-    folder = tmp_path / "new"
-    full = folder / "strides" / "ilc_nominal_3.nc.partial"
+def test_what_was_finished_before_the_disk_was_full_is_kept(
+    alone: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, replace = tmp_path / "new", Path.replace
 
-    class Filling(Inline):
-        def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-            if not full.is_symlink():
-                full.symlink_to("/dev/full")
-            return super().submit(fn, *args, **kwargs)
+    def fill(self: Path, target: Path) -> Path:
+        if target.name == "ilc_nominal_3.nc":
+            raise OSError(28, "No space left on device")
+        return replace(self, target)
 
-    with pytest.raises(FileProblem, match=r"No space left on device\); make room, and run"):
-        run_experiment(EXPERIMENT, folder, executor=Filling(), progress=False)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "replace", fill)
+        with pytest.raises(FileProblem, match=r"No space left on device\); make room, and run"):
+            run_experiment(EXPERIMENT, folder, executor=Inline(), progress=False)
     kept = contents(folder)
     assert "strides/ilc_nominal_0.nc" in kept
+    del kept["manifest.json"]  # which has announced what there was no room for
     assert kept.items() <= contents(alone.folder).items()
     run_experiment(EXPERIMENT, folder, executor=Inline(), progress=False)
     assert contents(folder) == contents(alone.folder)
