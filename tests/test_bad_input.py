@@ -371,6 +371,12 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "the law Odd of controller 'mine' answered torques that are not finite numbers",
     ),
     "law that answers nothing": (lambda: taught(None), "controller 'mine' answered None where (1"),
+    "speed of a torque library": (
+        lambda: TorqueLibrary(
+            np.arange(2.0), np.zeros((2, 2, 9, 12)), np.zeros((2, 2, 9, 12)), np.ones(2)
+        ).at(np.array([3.0])),
+        "speed 3 m/s is outside the torque library, which covers 0 to 1 m/s; choose a speed in",
+    ),
     # Worlds
     "scenario of nothing": (lambda: load_scenario(any_value), "scenario=None is nothing; give a "),
     "payload of a scenario": (
@@ -798,3 +804,4 @@ def test_a_command_that_makes_no_sense_ends_in_a_message_that_tells_what_is_want
     assert shown.err.startswith("pronk-pin: ")
     assert shown.err.count("\n") == 1
     assert not shown.out
+    assert not list(tmp_path.iterdir())
