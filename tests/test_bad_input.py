@@ -503,7 +503,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: run_experiment(
             experiment(seeds=range(10_000), schedule=Schedule(practice=86_400.0)), "x", workers=1
         ),
-        "10000 simulations of 1 robots over 86420.5 s take",
+        "10000 simulations of one robot over 86420.5 s take about",
     ),
     "results of nothing": (lambda: Results.load(any_value), "folder=None is no path; give a text"),
     "explanation of nothing": (lambda: explain(any_value), "result=None is no result; give Result"),
