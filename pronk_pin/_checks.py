@@ -83,7 +83,7 @@ def shown(value: object) -> str:
     try:
         text = " ".join(repr(value).split())
     except Exception:  # of a foreign object, whose __repr__ may do anything
-        text = f"a {type(value).__name__}"
+        text = _with_article(type(value).__name__)
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
 

@@ -13,6 +13,9 @@ _LONGEST_WORD = 60
 """Characters of an unknown name that its error shows."""
 
 
+_NEIGHBOUR = "by 'gaits build' with that in --speeds or --apex too, or optimize_gait(initial=...)"
+
+
 class PronkError(Exception):
     """Base class of all errors of this package."""
 
@@ -63,19 +66,27 @@ def reading(kind: str, remedy: str) -> Iterator[None]:
 
 
 class SpeedOutOfRange(PronkError):
-    """A speed that the gait library does not cover.
+    """A speed that a library of gaits or of torques does not cover.
 
     Attributes:
         speed: The speed asked for [m/s].
         lowest, highest: The range of the library [m/s].
     """
 
-    def __init__(self, speed: float, lowest: float, highest: float) -> None:
+    def __init__(
+        self,
+        speed: float,
+        lowest: float,
+        highest: float,
+        *,
+        library: str = "gait library",
+        remedy: str = "make a library with it by 'pronk-pin gaits build', to be looked at with "
+        "--library (comparisons play the shipped one)",
+    ) -> None:
         self.speed, self.lowest, self.highest = speed, lowest, highest
         super().__init__(
-            f"speed {speed:g} m/s is outside the gait library, which covers {lowest:g} to "
-            f"{highest:g} m/s; choose a speed in that range, or extend the library with "
-            "'pronk-pin gaits build'"
+            f"speed {speed:g} m/s is outside the {library}, which covers {lowest:g} to "
+            f"{highest:g} m/s; choose a speed in that range, or {remedy}"
         )
 
 
@@ -91,7 +102,7 @@ class ApexOutOfRange(PronkError):
         self.apex, self.lowest, self.highest = apex, lowest, highest
         super().__init__(
             f"apex {apex:g} m is outside the gait library, which covers {lowest:g} to "
-            f"{highest:g} m; choose an apex in that range, or extend the library with "
+            f"{highest:g} m; choose an apex in that range, or make a library with it by "
             "'pronk-pin gaits build --apex'"
         )
 
@@ -162,12 +173,15 @@ class GaitNotFound(PronkError):
         elif self.fights is not None:
             advice = (
                 "its demands do not fight, a gait exists on a coarse mesh: start from the solution "
-                "of a neighbouring speed or apex"
+                f"of a neighbouring speed or apex ({_NEIGHBOUR})"
             )
         else:
             worst = sorted(violations.items(), key=lambda item: -item[1])[:3]
             listed = ", ".join(f"{name} {value:.1e}" for name, value in worst)
-            advice = f"worst violations: {listed}; start from a neighbouring speed's solution"
+            advice = (
+                f"worst violations: {listed}; start from a neighbouring speed's solution "
+                f"({_NEIGHBOUR})"
+            )
         super().__init__(f"no gait found at {speed:g} m/s ({status}); {advice}")
 
     def with_note(self, note: str) -> GaitNotFound:

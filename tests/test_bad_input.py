@@ -371,6 +371,12 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "the law Odd of controller 'mine' answered torques that are not finite numbers",
     ),
     "law that answers nothing": (lambda: taught(None), "controller 'mine' answered None where (1"),
+    "speed of a torque library": (
+        lambda: TorqueLibrary(
+            np.arange(2.0), np.zeros((2, 2, 9, 12)), np.zeros((2, 2, 9, 12)), np.ones(2)
+        ).at(np.array([3.0])),
+        "speed 3 m/s is outside the torque library, which covers 0 to 1 m/s; choose a speed in",
+    ),
     # Worlds
     "scenario of nothing": (lambda: load_scenario(any_value), "scenario=None is nothing; give a "),
     "payload of a scenario": (
@@ -497,7 +503,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: run_experiment(
             experiment(seeds=range(10_000), schedule=Schedule(practice=86_400.0)), "x", workers=1
         ),
-        "10000 simulations of 1 robots over 86420.5 s take",
+        "10000 simulations of one robot over 86420.5 s take about",
     ),
     "results of nothing": (lambda: Results.load(any_value), "folder=None is no path; give a text"),
     "explanation of nothing": (lambda: explain(any_value), "result=None is no result; give Result"),
@@ -706,6 +712,9 @@ COMMANDS: list[tuple[list[str], str]] = [
     ([*BUILD, "--speeds", "0", "--workers", "0"], "0 workers; at least one is needed"),
     ([*BUILD, "--gait", "gallop"], "unknown gait 'gallop'; choose one of: pronk, bound"),
     ([*BUILD, "--base", "free"], "unknown base 'free'; choose one of: locked, sagittal"),
+    ([*BUILD, "--output", ""], "output='.' is no file; give the name of one, as gaits.npz"),
+    (["gaits", "show", "--apex", "nan"], "apex=nan; give a number that is finite"),
+    (["gaits", "show", "--apex", "0.5"], "no apex 0.5; choose one of: 0.32, 0.34, 0.36"),
     (["gaits", "show", "7"], "speed 7 m/s is outside the gait library, which covers -0.5 to 0.8"),
     (["gaits", "show", "nan"], "speed nan m/s is outside the gait library"),
     (["gaits", "show", "0.3", "--apex", "nan"], "apex nan m is outside the gait library"),
@@ -728,6 +737,12 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["ilc", "seeding", "--speed", "0", "0", "0"], "the speeds must increase; give each once, th"),
     (["ilc", "seeding", "--robot", "spot"], "unknown robot 'spot'; choose one of: a1"),
     (["view", "missing"], "missing: no such results folder or gait library; make the one with 'pr"),
+    (["view", "--controller", "pd"], "--controller is for a results folder; name one, or leave th"),
+    (["view", "--stride", "3"], "--stride is for a results folder; name one, or leave the option"),
+    (["view", "RESULT", "--apex", "0.3"], "--apex is for a gait library; name one, or leave the"),
+    (["view", "--host", ""], "host is empty; give an address of this machine, as 127.0.0.1"),
+    (["view", "--host", "a b"], "host='a b' is no address of this machine ("),
+    (["view", "a\nb"], "a b: no such results folder or gait library"),
     (["view", "--port", "70000"], "a port is a number from 0 to 65535, not 70000"),
     (["view", "--port", "-1"], "a port is a number from 0 to 65535, not -1"),
     (["view", "--port", "http"], "Error parsing --port: "),
@@ -798,3 +813,4 @@ def test_a_command_that_makes_no_sense_ends_in_a_message_that_tells_what_is_want
     assert shown.err.startswith("pronk-pin: ")
     assert shown.err.count("\n") == 1
     assert not shown.out
+    assert not list(tmp_path.iterdir())

@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
             warnings.showwarning = _show_warning
             return command.run() or 0
     except PronkError as error:
-        print(f"pronk-pin: {error}", file=sys.stderr)
+        print(f"pronk-pin: {' '.join(str(error).splitlines())}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("pronk-pin: interrupted", file=sys.stderr)

@@ -8,6 +8,8 @@ from typing import Annotated
 
 from tyro.conf import Positional, subcommand
 
+from .._checks import shown
+from ..errors import InvalidInput
 from ..gait import (
     GaitLibrary,
     build_library,
@@ -50,6 +52,10 @@ class Build:
 
     def run(self) -> None:
         """Do it."""
+        if not self.output.name or self.output.is_dir():
+            raise InvalidInput(
+                f"output={shown(str(self.output))} is no file; give the name of one, as gaits.npz"
+            )
         folder = self.folder or self.output.with_name(self.output.name + ".build")
         base = None if self.base is None else known_base(self.base)
         library = build_library(
@@ -97,7 +103,8 @@ class Show(_OfLibrary):
         """Do it."""
         library = self.load()
         if self.speed is None:
-            print(describe_library(library))
+            shown_gaits = library if self.apex is None else library.at_apex(self.apex)
+            print(describe_library(shown_gaits))
         else:
             print(describe_gait(library, self.speed, self.apex))
 

@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 
 from .._checks import NOT_NEGATIVE, none_or, real, whole
 from ..compare import Results
-from ..errors import FileProblem
+from ..errors import FileProblem, InvalidInput
 from ..viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
 from ..viz.live import DURATION, known_port
 from ..viz.practice import practice_programme
@@ -88,8 +88,15 @@ class View:
                 duration=self.duration,
             )
 
+    def _refuse(self, options: tuple[str, ...], other: str) -> None:
+        """Refuse options of something else than what is shown."""
+        for name in options:
+            if getattr(self, name) is not None:
+                raise InvalidInput(f"--{name} is for {other}; name one, or leave the option out")
+
     def _programme(self) -> Programme:
         if self.what is not None and self.what.is_dir():
+            self._refuse(("apex",), "a gait library")
             return practice_programme(
                 Results.load(self.what),
                 speed=self.speed,
@@ -105,6 +112,7 @@ class View:
                 "make the one with 'pronk-pin compare --folder', the other with 'pronk-pin gaits "
                 "build --output'",
             )
+        self._refuse(("controller", "scenario", "beside", "stride"), "a results folder")
         return library_programme(
             open_library(self.what, self.robot, self.gait, self.base),
             speed=self.speed,

@@ -243,6 +243,7 @@ def run_cell(
     Returns:
         The strides: see `compare.strides`.
     """
+    instance_of("cell", cell, Cell, "a Cell, one of Experiment.cells()")
     robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.world)
     library, spec = _gaits(cell.robot, cell.base), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]

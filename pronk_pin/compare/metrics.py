@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from .._checks import instance_of, known_name
 from .._typing import Array, BoolArray
 from ..control import SKIPPED
 from ..robot import JOINTS
@@ -36,6 +37,7 @@ def steady(strides: xr.Dataset) -> xr.Dataset:
     not learn, so that all are judged on the same strides: fewer, then, after a short learning. A
     robot that finished none has NaN in all of them.
     """
+    instance_of("strides", strides, xr.Dataset, "strides, as Results.strides() returns them")
     count = strides["count"].to_numpy()
     learned = _switched(strides).sum(axis=1)
     made = np.where(learned > 0, learned, count)[count > 0]
@@ -221,6 +223,8 @@ def reduction(summary: pd.DataFrame, metric: str) -> pd.DataFrame:
     Returns:
         The rows of the other controllers with their `value` replaced by `1 - value / PD`.
     """
+    instance_of("summary", summary, pd.DataFrame, "the table of Results.summary()")
+    known_name("metric", metric, sorted(set(summary["metric"])))
     rows = summary[summary["metric"] == metric]
     keys = [key for key in KEYS if key != "controller"]
     pd_rows = rows[rows["controller"] == "pd"].set_index(keys)["value"]

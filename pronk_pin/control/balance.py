@@ -13,7 +13,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .._checks import SHARE, keep_instances, keep_reals
+from .._checks import (
+    POSITIVE,
+    SHARE,
+    Interval,
+    instance_of,
+    keep_instances,
+    keep_reals,
+    real,
+    whole,
+)
 from .._typing import Array, IntArray
 from ..conventions import rotation_matrix
 from ..gait import Gait
@@ -21,6 +30,7 @@ from ..inverse_dynamics.distribution import distribute_wrench
 from ..kinematics.legs import contact_points, leg_geometry
 from ..robot import JOINTS, Robot
 from .attitude import AttitudeRegulator, attitude_angle, attitude_error, pitched
+from .feedforward import known_gaits
 from .placement import FootPlacement, placed
 from .record import PARTS
 from .tape import Gains
@@ -52,6 +62,9 @@ class BalanceSpec:
         keep_reals(self, {"learned": SHARE, "landing": SHARE}, "balance: ")
 
 
+_TICKS = Interval(1, 10_000_000)
+
+
 class Balance:
     """Runs one `BalanceSpec` on n robots, each with its own gait.
 
@@ -74,6 +87,10 @@ class Balance:
         ticks: int,
         timestep: float,
     ) -> None:
+        gaits = known_gaits(robot, gaits)
+        instance_of("spec", spec, BalanceSpec)
+        instance_of("gains", gains, Gains)
+        ticks, timestep = whole("ticks", ticks, _TICKS), real("timestep", timestep, POSITIVE)
         self._spec, self._gains, self._radius = spec, gains, robot.foot_radius
         self._geometry = leg_geometry(robot)
         duration = np.array([[getattr(g, part).duration for part in PARTS] for g in gaits])

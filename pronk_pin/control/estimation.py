@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .._checks import Interval, keep_reals, real
+from .._checks import POSITIVE, Interval, instance_of, keep_reals, real
 from .._typing import Array, IntArray
 from ..conventions import rotation_matrix
 from ..kinematics import leg_odometry
@@ -134,6 +134,9 @@ class AttitudeEstimator:
         timestep: float,
         gravity: float,
     ) -> None:
+        instance_of("spec", spec, AttitudeFilter)
+        timestep = real("timestep", timestep, POSITIVE)
+        gravity = real("gravity", gravity, POSITIVE)
         self._timestep, self._weight = timestep, spec.gain / gravity
         turning, force = (readings.mean(axis=1) for readings in at_rest)
         self._bias = turning, force - np.array([0.0, 0.0, gravity])

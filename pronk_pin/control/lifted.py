@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .._checks import instance_of, numbers
 from .._typing import Array
 from ..errors import InvalidInput
 from .record import StrideRecord
@@ -50,6 +51,16 @@ class LiftedModel:
     torque: Array
 
     def __post_init__(self) -> None:
+        names = ("angle", "rate", "angle_start", "rate_start", "carry", "push", "torque")
+        given = {name: getattr(self, name) for name in names}
+        for name, array in zip(given, numbers(**given), strict=True):
+            object.__setattr__(self, name, array)
+        instance_of("gains", self.gains, Gains)
+        if self.torque.ndim != 2 or self.carry.ndim != 2:
+            raise InvalidInput(
+                f"torque and carry of the shapes {self.torque.shape} and {self.carry.shape}; give "
+                "(samples, joints) and (states, states)"
+            )
         size, states = self.torque.size, len(self.carry)
         shapes = {
             "angle": (size, size),

@@ -124,7 +124,13 @@ class TorqueLibrary:
         wanted, lowest, highest = np.atleast_1d(speeds), self.speeds[0], self.speeds[-1]
         for speed in wanted:
             if not lowest - 1e-9 <= speed <= highest + 1e-9:
-                raise SpeedOutOfRange(float(speed), float(lowest), float(highest))
+                raise SpeedOutOfRange(
+                    float(speed),
+                    float(lowest),
+                    float(highest),
+                    library="torque library",
+                    remedy="practise at speeds around it",
+                )
         return np.interp(wanted, self.speeds, np.arange(len(self.speeds)))
 
     def without(self, speed: float) -> TorqueLibrary:

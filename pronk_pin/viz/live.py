@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import json
 import socket
 import threading
@@ -34,7 +35,7 @@ import tornado.web
 import tornado.websocket
 from tornado.httputil import HTTPServerRequest
 
-from .._checks import Interval, none_or, real, text, whole
+from .._checks import Interval, none_or, real, shown, text, whole
 from .._state import as_array, as_q
 from ..errors import InvalidInput, PortUnavailable, PronkError
 from .documents import film_blob, robot_blob, row_bytes, stream_row
@@ -386,6 +387,13 @@ def _json(value: object) -> str:
     return json.dumps(value).replace("<", "\\u003c")
 
 
+def _no_host(host: str, error: Exception) -> InvalidInput:
+    reason = getattr(error, "strerror", None) or error
+    return InvalidInput(
+        f"host={shown(host)} is no address of this machine ({reason}); give one, as 127.0.0.1"
+    )
+
+
 def known_port(port: int | None) -> int | None:
     """A port, or None for a free one.
 
@@ -400,11 +408,17 @@ def known_port(port: int | None) -> int | None:
 
 def _bind(host: str, port: int | None) -> list[socket.socket]:
     """Sockets that listen on the port asked for, or on the first free one."""
-    port, host = known_port(port), text("host", host)
+    port = known_port(port)
+    if not text("host", host):
+        raise InvalidInput("host is empty; give an address of this machine, as 127.0.0.1")
     ports = PORTS if port is None else range(port, port + 1)
     for candidate in ports:
         try:
             return tornado.netutil.bind_sockets(candidate, address=host)
+        except (socket.gaierror, UnicodeError) as error:
+            raise _no_host(host, error) from error
         except OSError as error:
+            if error.errno == errno.EADDRNOTAVAIL:
+                raise _no_host(host, error) from error
             reason = error.strerror or str(error)
     raise PortUnavailable(host, ports, reason)

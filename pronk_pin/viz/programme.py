@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
+from .._checks import instance_of
 from ..errors import InvalidInput
 from .scene import Scene
 
@@ -35,7 +36,10 @@ class Programme:
     @classmethod
     def of(cls, shown: Scene | Programme) -> Programme:
         """A programme as it is, a scene as a programme without choice."""
-        return shown if isinstance(shown, Programme) else cls(lambda choice: shown)
+        if isinstance(shown, Programme):
+            return shown
+        scene = instance_of("shown", shown, Scene, "a Scene or a Programme")
+        return cls(lambda choice: scene)
 
     def check(self, choice: Choice) -> None:
         """Check that a choice has a known value for each option, and no other.

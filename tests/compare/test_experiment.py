@@ -98,7 +98,7 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
         (
             {"speeds": (0.0, 0.9)},
             "speed 0.9 m/s is outside the gait library, which covers -0.5 to 0.8 m/s; choose a "
-            "speed in that range, or extend the library with 'pronk-pin gaits build'",
+            "speed in that range, or make a library with it by 'pronk-pin gaits build'",
         ),
         ({"speeds": (0.1, 0.1)}, "speeds must name at least one, and none of them twice"),
         (
