@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-from pronk_pin.gait import GaitSolution, gait_problem, optimize_gait
+from pronk_pin.gait import GaitSolution, audit, gait_problem, optimize_gait
 from pronk_pin.gait.reintegration import forward_dynamics, guided_rows
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import NB, Robot
@@ -234,7 +234,7 @@ def judge(robot: Robot, ours: GaitSolution, answer: Answer) -> dict[str, float]:
 
 def of_ours(ours: GaitSolution) -> dict[str, float]:
     """The same of our solution, from its audit."""
-    found, problem = ours.audit(refine=False), ours.problem
+    found, problem = audit(ours, refine=False), ours.problem
     named = {check.name: check.value for check in found.constraints}
     return {
         "cost, eq. (6)": ours.cost,
