@@ -1,11 +1,10 @@
-"""What did it learn? From a result to an `Explanation`."""
+"""What did it learn? From the strides of a simulation to an `Explanation`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -22,9 +21,6 @@ from .ground import Ground, survey
 from .recording import PARTS, PhaseRecording, recordings
 from .shares import share_table, shares
 from .terms import TERMS, Term, parameters, truth
-
-if TYPE_CHECKING:
-    from ..results import Results  # which imports the experiments, which explain
 
 REPEATS = 0.95
 """Least repetition of a speed's strides that are explained, see `repetition`."""
@@ -97,10 +93,8 @@ class Explanation:
 
 
 def explain(
-    result: Results | xr.Dataset,
+    strides: xr.Dataset,
     *,
-    controller: str = "ilc",
-    scenario: str | None = None,
     terms: tuple[Term, ...] = TERMS,
     parts: Sequence[str] = PARTS,
     gaits: Sequence[Gait] | None = None,
@@ -111,9 +105,7 @@ def explain(
     """Take the torque that was learned apart into what the model lacks.
 
     Args:
-        result: A result, or the strides of one of its cells.
-        controller: Which controller of a result.
-        scenario: Which scenario of a result; by default the first.
+        strides: The strides of one cell, as `Results.strides` reads them.
         terms: What the model may lack.
         parts: Which phases to use.
         gaits: The gaits that were played, one for each speed; by default the shipped ones.
@@ -122,12 +114,8 @@ def explain(
         rng: Source of the draws and of that noise; by default one that starts at 0.
 
     Raises:
-        InvalidInput: The base is not locked, the result has no ticks, or too few strides.
+        InvalidInput: The base is not locked, the strides have no ticks, or too few strides.
     """
-    if isinstance(result, xr.Dataset):
-        strides = result
-    else:
-        strides = result.strides(result.find(controller=controller, scenario=scenario))
     if strides.attrs.get("base", "locked") != "locked":
         raise InvalidInput(
             f"explain needs a locked base, not '{strides.attrs['base']}': run the comparison with "
