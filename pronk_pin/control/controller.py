@@ -12,6 +12,7 @@ import numpy as np
 
 from .._state import known_name
 from .._typing import Array, BoolArray, IntArray
+from ..base import BASES
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..kinematics import rotate_leg
@@ -19,7 +20,6 @@ from ..robot import NL, Robot
 from .balance import Balance
 from .controller_spec import ControllerSpec
 from .estimation import SpeedEstimator
-from .feedforward import BASES
 from .filters import ZeroPhaseFilter
 from .guided_strides import Settings
 from .learning import SKIPPED, anti_windup, given

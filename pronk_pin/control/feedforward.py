@@ -8,6 +8,7 @@ import numpy as np
 
 from .._state import known_name
 from .._typing import Array
+from ..base import BASES
 from ..gait import Gait
 from ..inverse_dynamics import SAGITTAL_GUIDE, feedforward
 from ..robot import Robot
@@ -19,9 +20,6 @@ GUIDES: dict[str, tuple[str, ...] | None] = {
     "free": None,
 }
 """What a guide holds of the trunk, by how it may move: x and z only, pitch too, or anyhow."""
-
-BASES = tuple(GUIDES)
-"""How a trunk may move."""
 
 
 def model_feedforward(

@@ -27,12 +27,13 @@ from tqdm import tqdm
 
 from .._typing import Array
 from .._workers import follow_parent
+from ..base import Base
 from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
 from ..robot import Robot, RobotSpec, load_robot
 from .audit import audit, bezier_orders
 from .library import DAMAGE, SCHEMA, GaitLibrary, from_arrays, to_arrays, write_arrays
 from .optimize import GaitSolution, SolverState, optimize_gait
-from .problem import Base, GaitProblem
+from .problem import GaitProblem
 from .style import gait_problem, load_style
 
 _PACKAGES = ("casadi", "pin", "numpy", "scipy", "example-robot-data")

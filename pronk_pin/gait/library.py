@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from .._typing import Array
+from ..base import Base
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
 from ..robot import ROBOTS, Robot, load_robot
 from .checks import Audit
 from .gait import ARRAYS, Gait, GaitPhase
-from .problem import Base
 from .residual import GaitResidual, gait_residual
 from .style import library_name
 

@@ -10,12 +10,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from .._state import known_name
+from ..base import Base
 from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..robot import Robot
-
-Base = Literal["locked", "sagittal"]
-"""How the trunk may move: along x and z only, as in the paper, or pitching too."""
 
 Pair = Literal["front", "rear"]
 """A pair of legs, left and right: in a gait with mirror symmetry they do the same."""

@@ -8,12 +8,11 @@ import numpy as np
 import pinocchio as pin
 
 from .._typing import Array
-from ..dynamics import Contact, contact_jacobian
+from ..base import Base
+from ..dynamics import Contact, contact_jacobian, planar_rows
 from ..kinematics import foot_positions
 from ..robot import NB, Robot
 from .gait import Gait, Motion
-from .problem import Base
-from .reintegration import guided_rows
 
 
 class GaitResidual(NamedTuple):
@@ -55,7 +54,7 @@ def gait_residual(
         base: How the trunk may move; what a guide holds it by is not missing.
         samples: Phases at which to look, in each phase of the gait.
     """
-    rows = guided_rows(robot, base)
+    rows = planar_rows(robot, base)
     force = moment = height = 0.0
     for phase in gait.phases:
         motion = phase.motion(robot, np.linspace(0.0, 1.0, samples))
