@@ -3,10 +3,10 @@
 from ..base import BASES
 from .attitude import AttitudeRegulator, attitude_angle, attitude_error, roll_pitch_yaw
 from .balance import Balance, BalanceSpec
-from .contacts import ContactDetector, StanceContact
+from .contacts import ContactDetector, StanceContact, TouchdownDetector
 from .controller import Controller
 from .controller_spec import CONTROLLERS, ControllerSpec, load_controller
-from .estimation import AttitudeEstimator, AttitudeFilter
+from .estimation import AttitudeEstimator, AttitudeFilter, TrunkKnown
 from .feedforward import model_feedforward
 from .filters import ZeroPhaseFilter
 from .guided_strides import GuidedStrides, Settings
@@ -64,6 +64,8 @@ __all__ = [
     "StrideSelection",
     "Tape",
     "TorqueLibrary",
+    "TouchdownDetector",
+    "TrunkKnown",
     "ZeroPhaseFilter",
     "anti_windup",
     "attitude_angle",
