@@ -9,13 +9,14 @@ import struct
 from collections.abc import Collection, Iterable
 from functools import lru_cache
 from math import isfinite
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ._typing import Array
 from .errors import InvalidInput, UnknownName
+from .robot import Robot
 
 _UNIT_TOLERANCE = 1e-6
 """How far the norm of a base quaternion may be from 1."""
@@ -23,22 +24,6 @@ _UNIT_TOLERANCE = 1e-6
 _FLOAT = np.dtype(np.float64)
 _BASE = struct.Struct("7d").unpack_from
 """Trunk position and quaternion of a configuration, at a quarter of the cost of NumPy."""
-
-
-class Layout(Protocol):
-    """What of a robot decides the shape of its states; a robot can check its own here, too."""
-
-    @property
-    def nq(self) -> int:
-        """Length of a configuration."""
-
-    @property
-    def nv(self) -> int:
-        """Length of a velocity."""
-
-    @property
-    def legs(self) -> tuple[str, ...]:
-        """Names of the legs, in their order."""
 
 
 REFUSALS = (TypeError, ValueError, AttributeError)
@@ -95,7 +80,7 @@ def _one_sound(value: Any, size: int) -> bool:
     )
 
 
-def as_q(robot: Layout, q: npt.ArrayLike) -> Array:
+def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
     """A configuration (..., nq) with a unit base quaternion.
 
     Raises:
@@ -117,7 +102,7 @@ def as_q(robot: Layout, q: npt.ArrayLike) -> Array:
     return array
 
 
-def as_state(robot: Layout, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, Array]:
+def as_state(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, Array]:
     """A configuration (..., nq) and a velocity (..., nv) of the same batch shape.
 
     Raises:
@@ -138,7 +123,7 @@ def as_one(name: str, array: Array) -> Array:
     return array
 
 
-def leg_indices(robot: Layout, feet: Iterable[str] | None) -> tuple[int, ...]:
+def leg_indices(robot: Robot, feet: Iterable[str] | None) -> tuple[int, ...]:
     """Indices of legs given by name, in the order given; None means all legs.
 
     Raises:
@@ -147,18 +132,18 @@ def leg_indices(robot: Layout, feet: Iterable[str] | None) -> tuple[int, ...]:
     """
     if feet is not None:
         feet = (feet,) if isinstance(feet, str) else tuple(feet)
-    return _leg_indices(robot.legs, feet)
+    return _leg_indices(robot, feet)
 
 
 @lru_cache(maxsize=256)
-def _leg_indices(legs: tuple[str, ...], names: tuple[str, ...] | None) -> tuple[int, ...]:
+def _leg_indices(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, ...]:
     if names is None:
-        return tuple(range(len(legs)))
+        return tuple(range(len(robot.legs)))
     for name in names:
-        known_name("leg", name, legs)
+        known_name("leg", name, robot.legs)
     if len(set(names)) != len(names):
         raise InvalidInput(f"feet={list(names)} names a leg twice; name each leg once")
-    return tuple(legs.index(name) for name in names)
+    return tuple(robot.legs.index(name) for name in names)
 
 
 def known_name(kind: str, name: str, known: Collection[str]) -> str:
