@@ -23,6 +23,7 @@ from pronk_pin.gait import (
     SPEEDS,
     GaitProblem,
     GaitSolution,
+    audit,
     gait_problem,
     optimize_gait,
     vertical_hop,
@@ -114,7 +115,7 @@ def main() -> None:
         solutions = cold(robot)
         warm(robot)
         for solution in solutions:
-            found = solution.audit(refine=False)
+            found = audit(solution, refine=False)
             if not found.passed:
                 print(f"  {solution.problem.speed:+.1f} m/s fails its audit:\n{found.table()}")
         random_starts(robot, base="locked")

@@ -17,8 +17,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-from pronk_pin.gait import GaitSolution, gait_problem, optimize_gait
-from pronk_pin.gait.reintegration import forward_dynamics, guided_rows
+from pronk_pin.dynamics import planar_dynamics, planar_rows
+from pronk_pin.gait import GaitSolution, audit, gait_problem, optimize_gait
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import NB, Robot
 
@@ -177,7 +177,7 @@ def solve(robot: Robot, ours: GaitSolution, scheme: str, dt: float) -> Answer:
 
 def planar(solution: GaitSolution) -> list[np.ndarray]:
     """x, z, joints and their rates of our solution at the beginning of each phase."""
-    rows = guided_rows(solution.problem.robot)
+    rows = planar_rows(solution.problem.robot)
     return [
         np.concatenate([m.q[0, [0, 2]], m.q[0, NB + 1 :], m.v[0, rows]])
         for m in solution.motions.values()
@@ -187,20 +187,20 @@ def planar(solution: GaitSolution) -> list[np.ndarray]:
 def whole(robot: Robot, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """q and v of the whole robot."""
     v = np.zeros(robot.nv)
-    v[guided_rows(robot)] = x[14:]
+    v[planar_rows(robot)] = x[14:]
     return robot.q_from_base(np.array([x[0], 0.0, x[1]]), x[2:14]), v
 
 
 def reintegrated(robot: Robot, answer: Answer) -> float:
     """Largest distance of a joint when the torques are played by an adaptive integrator [rad]."""
     y, worst = answer.x[0], 0.0
-    rows = guided_rows(robot)
+    rows = planar_rows(robot)
     for k, tau in enumerate(answer.u):
         feet = robot.legs if k < answer.lift_off else ()
 
         def rate(_: float, y: np.ndarray, tau=tau, feet=feet) -> np.ndarray:
             q, v = whole(robot, y)
-            a = forward_dynamics(robot, q, v, tau, contact="point", feet=feet)
+            a = planar_dynamics(robot, q, v, tau, contact="point", feet=feet)
             return np.concatenate([y[14:], a[rows]])
 
         span = (answer.t[k], answer.t[k + 1])
@@ -234,7 +234,7 @@ def judge(robot: Robot, ours: GaitSolution, answer: Answer) -> dict[str, float]:
 
 def of_ours(ours: GaitSolution) -> dict[str, float]:
     """The same of our solution, from its audit."""
-    found, problem = ours.audit(refine=False), ours.problem
+    found, problem = audit(ours, refine=False), ours.problem
     named = {check.name: check.value for check in found.constraints}
     return {
         "cost, eq. (6)": ours.cost,

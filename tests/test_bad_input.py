@@ -506,7 +506,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "10000 simulations of one robot over 86420.5 s take about",
     ),
     "results of nothing": (lambda: Results.load(any_value), "folder=None is no path; give a text"),
-    "explanation of nothing": (lambda: explain(any_value), "result=None is no result; give Result"),
+    "explanation of nothing": (lambda: explain(any_value), "strides=None"),
     "explanation without draws": (
         lambda: explain(strides_of("ilc"), draws=0),
         "draws=0; give a whole number from 2 to 1000000",

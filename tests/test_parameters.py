@@ -13,7 +13,6 @@ import pytest
 
 from pronk_pin import ModelParameters, Robot
 from pronk_pin._typing import Array
-from pronk_pin.control.guided import guided_derivatives, guided_impact
 from pronk_pin.conventions import from_mujoco, to_mujoco
 from pronk_pin.dynamics import (
     contact_jacobian,
@@ -21,6 +20,9 @@ from pronk_pin.dynamics import (
     flight_dynamics,
     impact,
     mass_matrix,
+    planar_derivatives,
+    planar_impact,
+    planar_rows,
     simulate_phase,
     stance_dae,
     stance_derivatives,
@@ -28,7 +30,6 @@ from pronk_pin.dynamics import (
 )
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import gait_problem, optimize_gait
-from pronk_pin.gait.reintegration import guided_rows
 from pronk_pin.gait.residual import missing_forces
 from pronk_pin.inverse_dynamics import inverse_dynamics
 from pronk_pin.model_files import mended_spec, write_mjcf, write_urdf
@@ -169,11 +170,11 @@ def test_the_guided_derivatives_know_friction_and_motors(robot: Robot, mended_a1
     rng, step = np.random.default_rng(2), 1e-6
     q, v, tau = robot.standing, np.zeros(18), 3.0 * rng.standard_normal(12)
     v[6:] = 0.2 * rng.standard_normal(12)
-    found = guided_derivatives(mended_a1, q, v, tau, contact="rolling")
-    for k, row in enumerate(guided_rows(robot)):
+    found = planar_derivatives(mended_a1, q, v, tau, contact="rolling")
+    for k, row in enumerate(planar_rows(robot)):
         d = step * np.eye(18)[row]
         high, low = (
-            guided_derivatives(mended_a1, q, v + sign * d, tau, contact="rolling").a
+            planar_derivatives(mended_a1, q, v + sign * d, tau, contact="rolling").a
             for sign in (1.0, -1.0)
         )
         scale = np.abs(found.da_dv).max()
@@ -192,12 +193,12 @@ def test_a_gait_of_the_mended_model_obeys_its_equations(robot: Robot) -> None:
         ModelParameters((0.01,) * 3, (0.1,) * 3, (0.2,) * 3, 1.0, torque_constant=0.9)
     )
     solution = optimize_gait(gait_problem(mended, 0.3))
-    rows = guided_rows(robot)
+    rows = planar_rows(robot)
     for motion in solution.motions.values():
         assert np.abs(missing_forces(mended, motion, "rolling")[:, rows]).max() < 1e-6
         assert np.abs(missing_forces(robot, motion, "rolling")[:, rows]).max() > 1.0
     landing, stance = solution.motions["flight"].v[-1], solution.motions["stance"]
-    after = guided_impact(mended, stance.q[0], landing[None, rows], contact="rolling")[0]
+    after = planar_impact(mended, stance.q[0], landing[None, rows], contact="rolling")[0]
     np.testing.assert_allclose(after, stance.v[0, rows], atol=1e-6)
 
 

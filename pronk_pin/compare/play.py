@@ -12,19 +12,26 @@ from dataclasses import replace
 import numpy as np
 
 from .._typing import Array, IntArray
-from ..control import Balance, ControllerSpec, PhaseLog, Tape, clip_torque, phase_grid
+from ..control import (
+    AttitudeEstimator,
+    Balance,
+    ControllerSpec,
+    PhaseLog,
+    Tape,
+    TouchdownDetector,
+    TrunkKnown,
+    clip_torque,
+    phase_grid,
+)
 from ..conventions import rotation_matrix
 from ..gait import Gait
 from ..robot import Robot
-from .inertial import InertialUnit, TrunkKnown
+from .inertial import InertialUnit
 from .motors import Motors
 from .record import TickLog
 from .scenario import Scenario
 from .sensors import SensorSuite
 from .world import Motion, World, finite
-
-_EARLIEST_TOUCHDOWN = 0.5
-"""Phase of flight before which contact is the lift-off's, not a touchdown."""
 
 _EXPECTED_TOUCHDOWN = 0.9
 """Phase of flight up to which it is played in one go."""
@@ -92,17 +99,21 @@ class Player:
         self._level_imu = spec.imu and balance is None  # read a phase at a time
         self._inertial = None  # read at each tick
         if balance is not None and spec.imu:
-            self._inertial = InertialUnit(
-                self.world, self.sensors, spec.attitude_filter, balance.at_touchdown
+            self._inertial = InertialUnit(self.world, self.sensors)
+            self._estimator = AttitudeEstimator(
+                spec.attitude_filter,
+                balance.at_touchdown,
+                self._inertial.at_rest(spec.attitude_filter.rest),
+                timestep=dt,
+                gravity=float(np.linalg.norm(scenario.gravity_vector)),
             )
         if not self._servos and not self._ahead:
             inertial = self._inertial is not None
             self.seen = TickLog(n, ticks, turns=turns, inertial=inertial)
         self._balance = balance
         self._late = spec.touchdown_ticks
-        self._load = spec.contact.touchdown * robot.mass * robot.gravity
         flight = np.array([gait.flight.duration for gait in gaits])
-        self._earliest = np.round(_EARLIEST_TOUCHDOWN * flight / dt).astype(np.intp)
+        self._touchdown = TouchdownDetector(spec.contact, robot, flight, timestep=dt)
         self._expected = np.round(_EXPECTED_TOUCHDOWN * flight / dt).astype(np.intp)
         heights = [gait.stance.base_reference(phase_grid())[0][:, 1] for gait in gaits]
         self._floor = _FALLEN * np.min(heights, axis=1)
@@ -206,7 +217,9 @@ class Player:
         if self._balance is None:
             return None
         if self._inertial is not None:
-            return self._inertial.read(rows)
+            gyro, force = self._inertial.read(rows)
+            self._estimator.update(rows, gyro, force)
+            return self._estimator.trunk(rows, force)
         return TrunkKnown(self.world.pose[rows], self.world.twist[rows], np.zeros((len(rows), 3)))
 
     def _felt(
@@ -237,8 +250,7 @@ class Player:
         count = tick + 1 + np.arange(motion.base.shape[1])  # ticks played after each step
         over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
         if airborne:
-            load = motion.force[..., 2].sum(axis=-1) > self._load
-            over |= load & (count > self._earliest[rows, None])
+            over |= self._touchdown.felt(rows, motion.force, count)
         if not finite(motion.path[:, -1]).all():  # what is not finite stays so
             over |= ~finite(motion.path[:, 1:])
         ended = over.any(axis=1)

@@ -24,8 +24,8 @@ from ..control import (
     phase_grid,
 )
 from ..control.analysis import Analysis, analyze, predict
-from ..control.guided import Rotors
 from ..control.rehearsal import rehearse
+from ..dynamics import Rotors
 from ..errors import InvalidInput
 from ..gait import load_library
 from ..robot import JOINTS, load_robot

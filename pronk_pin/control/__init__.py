@@ -1,12 +1,13 @@
 """What the robot is told to do: feedback, feedforward and learning, one tape a phase."""
 
+from ..base import BASES
 from .attitude import AttitudeRegulator, attitude_angle, attitude_error, roll_pitch_yaw
 from .balance import Balance, BalanceSpec
-from .contacts import ContactDetector, StanceContact
+from .contacts import ContactDetector, StanceContact, TouchdownDetector
 from .controller import Controller
 from .controller_spec import CONTROLLERS, ControllerSpec, load_controller
-from .estimation import AttitudeEstimator, AttitudeFilter
-from .feedforward import BASES, model_feedforward
+from .estimation import AttitudeEstimator, AttitudeFilter, TrunkKnown
+from .feedforward import model_feedforward
 from .filters import ZeroPhaseFilter
 from .guided_strides import GuidedStrides, Settings
 from .learning import (
@@ -63,6 +64,8 @@ __all__ = [
     "StrideSelection",
     "Tape",
     "TorqueLibrary",
+    "TouchdownDetector",
+    "TrunkKnown",
     "ZeroPhaseFilter",
     "anti_windup",
     "attitude_angle",

@@ -10,6 +10,10 @@ import numpy as np
 from .._checks import SHARE, Interval, keep_reals
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
+from ..robot import Robot
+
+_EARLIEST_TOUCHDOWN = 0.5
+"""Phase of flight before which contact is the lift-off's, not a touchdown."""
 
 
 class StanceContact(NamedTuple):
@@ -91,3 +95,31 @@ class ContactDetector:
     def contact_lost(self, stance: StanceContact) -> BoolArray:
         """Whether stances were spent in the air for the most part, shape (n,)."""
         return np.asarray(stance.share < self.least)
+
+
+class TouchdownDetector:
+    """Touchdowns of n robots: the load on their feet at a tick that is late enough in a flight.
+
+    Args:
+        spec: The load that is a contact.
+        robot: The robot.
+        flight: How long their flights last [s], shape (n,).
+        timestep: Length of a tick [s].
+    """
+
+    def __init__(
+        self, spec: ContactDetector, robot: Robot, flight: Array, *, timestep: float
+    ) -> None:
+        self._load = spec.touchdown * robot.mass * robot.gravity
+        self._earliest = np.round(_EARLIEST_TOUCHDOWN * flight / timestep).astype(np.intp)
+
+    def felt(self, rows: IntArray, force: Array, ticks: IntArray) -> BoolArray:
+        """Whether a touchdown is felt, shape (m, ticks).
+
+        Args:
+            rows: Which robots.
+            force: What their feet feel at each tick [N], shape (m, ticks, 4, 3).
+            ticks: How many ticks of the flight have passed then, shape (ticks,).
+        """
+        load = force[..., 2].sum(axis=-1) > self._load
+        return np.asarray(load & (ticks > self._earliest[rows, None]))

@@ -13,6 +13,7 @@ import numpy as np
 from .._checks import Interval, instance_of, known_name, real
 from .._state import as_array, as_numbers
 from .._typing import Array, BoolArray, IntArray
+from ..base import BASES
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..kinematics import rotate_leg
@@ -20,7 +21,7 @@ from ..robot import NL, Robot
 from .balance import Balance
 from .controller_spec import ControllerSpec
 from .estimation import SpeedEstimator
-from .feedforward import BASES, known_gaits
+from .feedforward import known_gaits
 from .filters import ZeroPhaseFilter
 from .guided_strides import Settings
 from .learning import SKIPPED, anti_windup, given, learned_by

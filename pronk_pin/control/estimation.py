@@ -10,6 +10,7 @@ Attitude, where the trunk may turn: the gyro's integral, held upright by the acc
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -109,6 +110,17 @@ class AttitudeFilter:
         keep_reals(self, checks, "attitude filter: ")
 
 
+class TrunkKnown(NamedTuple):
+    """What m robots know of their trunks at one tick."""
+
+    pose: Array
+    """Position and quaternion xyzw, shape (m, 7); an IMU says nothing of the position: zero."""
+    twist: Array
+    """Velocity in the trunk's own axes, shape (m, 6); nor of the linear one."""
+    specific_force: Array
+    """What the accelerometer says, trunk's axes [m/s^2], shape (m, 3); zero without one."""
+
+
 class AttitudeEstimator:
     """The attitudes of n robots, tick by tick.
 
@@ -161,6 +173,20 @@ class AttitudeEstimator:
             before = Rotation.from_quat(self.quaternion[rows])
             after = before * Rotation.from_rotvec(self._timestep * turn)
             self.quaternion[rows] = after.as_quat()
+
+    def trunk(self, rows: IntArray, specific_force: Array) -> TrunkKnown:
+        """What some robots know of their trunks.
+
+        Args:
+            rows: Which robots.
+            specific_force: What their accelerometers say, shape (m, 3).
+        """
+        nothing = np.zeros((len(rows), 3))
+        return TrunkKnown(
+            np.hstack([nothing, self.quaternion[rows]]),
+            np.hstack([nothing, self.rate[rows]]),
+            specific_force,
+        )
 
 
 _LEVEL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

@@ -9,6 +9,7 @@ import numpy as np
 from .._checks import instance_of, known_name, sequence_of
 from .._state import as_robot
 from .._typing import Array
+from ..base import BASES
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..inverse_dynamics import SAGITTAL_GUIDE, feedforward
@@ -21,9 +22,6 @@ GUIDES: dict[str, tuple[str, ...] | None] = {
     "free": None,
 }
 """What a guide holds of the trunk, by how it may move: x and z only, pitch too, or anyhow."""
-
-BASES = tuple(GUIDES)
-"""How a trunk may move."""
 
 
 def known_gaits(robot: Robot, gaits: Sequence[Gait]) -> tuple[Gait, ...]:

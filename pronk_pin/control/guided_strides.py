@@ -14,11 +14,11 @@ import numpy as np
 from .._checks import instance_of
 from .._state import as_robot
 from .._typing import Array
+from ..dynamics import Rotors, planar_acceleration, planar_impact
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..kinematics import foot_positions
 from ..robot import NB, NL, Robot
-from .guided import Rotors, guided_acceleration, guided_impact
 from .record import SAMPLES, phase_grid, resample
 from .regulation import LegAngleRegulator
 from .tape import Gains
@@ -192,12 +192,12 @@ class GuidedStrides:
         Feet that are bound to the ground stand even then.
         """
         dt, q, v = self.settings.timestep, self.q(state), self.v(state)
-        a, force = guided_acceleration(
+        a, force = planar_acceleration(
             self.robot, q, v, torque, contact="rolling" if stands else None, rotors=self.rotors
         )
         if stands and force < 0.0 and not bound:
             stands = False
-            a, _ = guided_acceleration(self.robot, q, v, torque, rotors=self.rotors)
+            a, _ = planar_acceleration(self.robot, q, v, torque, rotors=self.rotors)
         following = state.copy()
         following[RATE] += dt * a
         following[PLACE] += dt * following[RATE]
@@ -206,7 +206,7 @@ class GuidedStrides:
     def impact(self, state: Array) -> Array:
         """The state at which stance begins, from that at which flight ends."""
         after = state.copy()
-        after[RATE] = guided_impact(
+        after[RATE] = planar_impact(
             self.robot, self.q(state), state[None, RATE], contact="rolling", rotors=self.rotors
         )[0]
         after[0] = 0.0

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from .._typing import Array
+from ..dynamics import NO_ROTORS, Rotors, planar_acceleration, planar_derivatives
 from ..gait import Gait
 from ..robot import NL, Robot
-from .guided import NO_ROTORS, Rotors, guided_acceleration, guided_derivatives
 from .guided_strides import FREE, PLACE, RATE, SPEED, STATES, GuidedStrides, PlayedPhase, Settings
 from .lifted import LiftedModel
 from .record import SAMPLES, phase_grid
@@ -72,7 +72,7 @@ class _Linearised(GuidedStrides):
         for state, torque, stands in zip(
             phase.states[:-1], phase.torques, phase.standing, strict=True
         ):
-            at = guided_derivatives(
+            at = planar_derivatives(
                 self.robot,
                 self.q(state),
                 self.v(state),
@@ -111,7 +111,7 @@ class _Linearised(GuidedStrides):
             [(self.height(self.q(landing + d)) - self.height(self.q(landing - d))) for d in step]
         ) / (2.0 * _STEP)
         # Where the feet are higher by dh, touchdown is later by dh / (speed of their coming down).
-        a, _ = guided_acceleration(
+        a, _ = planar_acceleration(
             self.robot,
             q,
             self.v(landing),

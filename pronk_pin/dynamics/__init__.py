@@ -15,16 +15,30 @@ from .derivatives import (
     stance_derivatives,
 )
 from .forward import StanceDae, flight_dynamics, impact, stance_dae, stance_dynamics
+from .planar import (
+    NO_ROTORS,
+    PlanarDerivatives,
+    Rotors,
+    planar_acceleration,
+    planar_derivatives,
+    planar_dynamics,
+    planar_equations,
+    planar_impact,
+    planar_rows,
+)
 from .simulation import PhaseSimulation, simulate_phase
 from .stance import Baumgarte, Impact, StanceDynamics
 from .terms import coriolis_matrix, gravity, mass_matrix, nonlinear_effects, selection_matrix
 
 __all__ = [
+    "NO_ROTORS",
     "Baumgarte",
     "Contact",
     "FlightDerivatives",
     "Impact",
     "PhaseSimulation",
+    "PlanarDerivatives",
+    "Rotors",
     "StanceDae",
     "StanceDerivatives",
     "StanceDynamics",
@@ -37,6 +51,12 @@ __all__ = [
     "impact",
     "mass_matrix",
     "nonlinear_effects",
+    "planar_acceleration",
+    "planar_derivatives",
+    "planar_dynamics",
+    "planar_equations",
+    "planar_impact",
+    "planar_rows",
     "selection_matrix",
     "simulate_phase",
     "stance_dae",

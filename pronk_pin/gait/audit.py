@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .._typing import Array
-from ..dynamics import contact_jacobian
+from ..dynamics import contact_jacobian, planar_rows
 from ..errors import GaitNotFound
 from ..kinematics import foot_positions
 from ..robot import NB, Robot
@@ -23,7 +23,7 @@ from .checks import Audit, Check
 from .gait import Motion
 from .optimize import GaitSolution, fit_phase, optimize_gait, resampled
 from .problem import ContactPhase
-from .reintegration import drift, guided_rows
+from .reintegration import drift
 from .residual import missing_forces
 
 ORDERS = range(4, 17)
@@ -122,7 +122,7 @@ def _residual(solution: GaitSolution) -> tuple[Check, Check]:
     """Equations of motion (2) of the whole robot: in the rows that the guide leaves free nothing
     must be missing; in the others, what the guide carries."""
     robot, contact = solution.problem.robot, solution.problem.contact
-    rows, free, guide = guided_rows(robot, solution.problem.base), {}, {}
+    rows, free, guide = planar_rows(robot, solution.problem.base), {}, {}
     for name, motion in solution.motions.items():
         missing = missing_forces(robot, motion, contact)
         free[name] = (motion, missing[:, rows])

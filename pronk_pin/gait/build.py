@@ -29,13 +29,14 @@ from .._checks import reals
 from .._state import as_robot
 from .._typing import Array
 from .._workers import follow_parent, worker_count
+from ..base import Base
 from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
 from ..robot import Robot, RobotSpec, load_robot
 from .audit import audit, bezier_orders
 from .ballistics import check_ballistics
 from .library import DAMAGE, SCHEMA, GaitLibrary, from_arrays, to_arrays, write_arrays
 from .optimize import GaitSolution, SolverState, optimize_gait
-from .problem import Base, GaitProblem
+from .problem import GaitProblem
 from .style import gait_problem, load_style
 
 _PACKAGES = ("casadi", "pin", "numpy", "scipy", "example-robot-data")

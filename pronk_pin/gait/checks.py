@@ -6,10 +6,34 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from .transcription import UNITS
-
 TOLERANCE = 1e-8
 """Largest violation of a constraint that passes, in the constraint's unit."""
+
+UNITS = {
+    "average speed": "m",
+    "apex height": "m",
+    "dynamics": "N or N m",
+    "collocation": "m or rad",
+    "contact height": "m",
+    "contact acceleration": "m/s^2",
+    "touchdown impact": "N s",
+    "touchdown contact": "m/s",
+    "foot clearance": "m",
+    "phase continuity": "m or rad",
+    "periodicity": "m or rad",
+    "stride duration": "s",
+    "phase durations": "s",
+    "configuration limits": "rad",
+    "hip limit": "rad",
+    "pitch limit": "rad",
+    "trunk height": "m",
+    "velocity limits": "rad/s",
+    "torque limits": "N m",
+    "unilateral contact": "N",
+    "friction cone": "N",
+    "impulse cone": "N s",
+}
+"""Units of the constraints; where a constraint holds positions and velocities, the former's."""
 
 
 class Limit(NamedTuple):

@@ -24,12 +24,12 @@ import casadi as ca
 import numpy as np
 
 from .._typing import Array, BoolArray, IntArray
+from ..base import Base
 from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..parameters import SLIDING
 from ..robot import JOINTS, Robot
 from .newton_euler import BASE_COORDINATES, FrameMotion, mirrored, newton_euler
-from .problem import Base
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,11 +16,11 @@ import numpy as np
 from .._checks import instance_of, none_or, real, sequence_of
 from .._checks import path as known_path
 from .._typing import Array
+from ..base import Base
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
 from ..robot import ROBOTS, Robot, load_robot
 from .checks import Audit
 from .gait import ARRAYS, Gait, GaitPhase
-from .problem import Base
 from .residual import GaitResidual, gait_residual
 from .style import library_name
 

@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 
 from .._typing import Array
+from ..base import Base
 from ..robot import JOINTS, Robot
-from .problem import Base
 
 BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3}
 """Coordinates of the trunk: x and z, and pitch where it is free."""

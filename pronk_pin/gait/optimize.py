@@ -16,7 +16,7 @@ from .._checks import instance_of
 from .._typing import Array
 from ..errors import GaitNotFound, InvalidInput
 from .ballistics import check_ballistics
-from .checks import TOLERANCE, Audit
+from .checks import TOLERANCE
 from .collocation import node_phases, transcribe
 from .elastic import fights, remedies
 from .folded_model import FoldedModel
@@ -107,16 +107,6 @@ class GaitSolution:
     def values(self) -> dict[str, Array]:
         """The unknowns of the transcription by name, each (nodes, rows)."""
         return _program(self.problem).unpack(self.state.x)
-
-    def audit(self, *, refine: bool = True) -> Audit:
-        """Check the solution by other means than the solver's; takes a second or two.
-
-        Args:
-            refine: Find the order of convergence too, by solving on a mesh half as fine.
-        """
-        from .audit import audit  # which solves problems, and so builds on this module
-
-        return audit(self, refine=refine)
 
     @property
     def model(self) -> FoldedModel:

@@ -11,13 +11,11 @@ from typing import Any, Literal
 
 from .._checks import Interval, instance_of, keep_reals, known_name, reals, sequence_of, text, whole
 from .._state import as_robot
+from ..base import Base
 from ..dynamics import Contact
 from ..errors import InvalidInput
 from ..kinematics.contacts import CONTACTS
 from ..robot import Robot
-
-Base = Literal["locked", "sagittal"]
-"""How the trunk may move: along x and z only, as in the paper, or pitching too."""
 
 Pair = Literal["front", "rear"]
 """A pair of legs, left and right: in a gait with mirror symmetry they do the same."""

@@ -14,15 +14,14 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-from .._typing import Array, IntArray
-from ..dynamics import Contact, contact_bias, contact_jacobian
+from .._typing import Array
+from ..base import Base
+from ..dynamics import Contact, planar_dynamics, planar_rows
 from ..kinematics import foot_positions
 from ..robot import NB, Robot
 from .gait import Motion
-from .problem import Base
 
 _TOLERANCE = 1e-10
 
@@ -44,72 +43,6 @@ class Drift(NamedTuple):
     """Of the feet's centres [m]."""
 
 
-def guided_rows(robot: Robot, base: Base = "locked") -> IntArray:
-    """Indices of the velocities that the guide leaves free: x, z, perhaps pitch, and the joints.
-
-    x and z are those of the trunk, which stay in the sagittal plane.
-    """
-    free = (0, 2, 4) if base == "sagittal" else (0, 2)
-    return np.array([*free, *range(NB, robot.nv)], dtype=np.intp)
-
-
-def guided_equations(
-    robot: Robot,
-    q: Array,
-    v: Array,
-    tau: Array,
-    *,
-    contact: Contact = "rolling",
-    feet: Sequence[str] = (),
-    base: Base = "locked",
-) -> tuple[Array, Array]:
-    """Matrix and right-hand side of eq. (5) on the rows that the guide leaves free, (2) in flight.
-
-    Arguments are those of `forward_dynamics`. The unknowns are the accelerations of the free rows,
-    and the contact forces of the feet.
-    """
-    rows = guided_rows(robot, base)
-    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14 or 15, ...)
-    force = np.concatenate([np.zeros(NB), robot.joint_torques(tau, v[NB:])])
-    force = (force - pin.nonLinearEffects(robot.model, robot.data, q, v))[rows]
-    if not feet:
-        return mass, force
-    jacobian = contact_jacobian(robot, q, feet=feet, contact=contact)[:, rows]
-    bias = contact_bias(robot, q, v, feet=feet, contact=contact)
-    corner = np.zeros((len(jacobian), len(jacobian)))
-    return np.block([[mass, -jacobian.T], [jacobian, corner]]), np.concatenate([force, -bias])
-
-
-def forward_dynamics(
-    robot: Robot,
-    q: Array,
-    v: Array,
-    tau: Array,
-    *,
-    contact: Contact = "rolling",
-    feet: Sequence[str] = (),
-    base: Base = "locked",
-) -> Array:
-    """Acceleration of the guided robot: eq. (5) of the feet that stand, or (2) without any.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (19,).
-        v: Velocity, shape (18,).
-        tau: Motor torques [N m], shape (12,).
-        contact: How feet stand on the ground.
-        feet: The legs whose feet stand.
-        base: What the guide leaves the trunk.
-
-    Returns:
-        Acceleration, shape (18,), zero where the guide holds the trunk.
-    """
-    rows, a = guided_rows(robot, base), np.zeros(robot.nv)
-    kkt, right = guided_equations(robot, q, v, tau, contact=contact, feet=feet, base=base)
-    a[rows] = np.linalg.solve(kkt, right)[: len(rows)]
-    return a
-
-
 def drift(
     robot: Robot,
     motion: Motion,
@@ -127,7 +60,7 @@ def drift(
         feet: The legs whose feet stand.
         base: What the guide leaves the trunk.
     """
-    rows = guided_rows(robot, base)
+    rows = planar_rows(robot, base)
     n = len(rows)
     position = _coordinates(motion.q, n - robot.nu)  # (nodes, n)
     state = np.concatenate([position[0], motion.v[0, rows]])
@@ -139,7 +72,7 @@ def drift(
             q, v = _configuration(robot, y[:n]), np.zeros(robot.nv)
             v[rows] = y[n:]
             tau = _quadratic(t, times, torques)
-            a = forward_dynamics(robot, q, v, tau, contact=contact, feet=feet, base=base)
+            a = planar_dynamics(robot, q, v, tau, contact=contact, feet=feet, base=base)
             return np.concatenate([_rates(y, n, robot.nu), a[rows]])
 
         result = solve_ivp(

@@ -10,12 +10,11 @@ import pinocchio as pin
 from .._checks import Interval, instance_of, known_name, whole
 from .._state import as_robot
 from .._typing import Array
-from ..dynamics import Contact, contact_jacobian
+from ..base import Base
+from ..dynamics import Contact, contact_jacobian, planar_rows
 from ..kinematics import foot_positions
 from ..robot import NB, Robot
 from .gait import Gait, Motion
-from .problem import Base
-from .reintegration import guided_rows
 
 
 class GaitResidual(NamedTuple):
@@ -61,7 +60,7 @@ def gait_residual(
     instance_of("gait", gait, Gait)
     known_name("base", base, ("locked", "sagittal"))
     samples = whole("samples", samples, Interval(2, 100_000))
-    rows = guided_rows(robot, base)
+    rows = planar_rows(robot, base)
     force = moment = height = 0.0
     for phase in gait.phases:
         motion = phase.motion(robot, np.linspace(0.0, 1.0, samples))

@@ -16,32 +16,6 @@ import numpy as np
 from .._typing import Array
 from ..errors import InvalidInput
 
-UNITS = {
-    "average speed": "m",
-    "apex height": "m",
-    "dynamics": "N or N m",
-    "collocation": "m or rad",
-    "contact height": "m",
-    "contact acceleration": "m/s^2",
-    "touchdown impact": "N s",
-    "touchdown contact": "m/s",
-    "foot clearance": "m",
-    "phase continuity": "m or rad",
-    "periodicity": "m or rad",
-    "stride duration": "s",
-    "phase durations": "s",
-    "configuration limits": "rad",
-    "hip limit": "rad",
-    "pitch limit": "rad",
-    "trunk height": "m",
-    "velocity limits": "rad/s",
-    "torque limits": "N m",
-    "unilateral contact": "N",
-    "friction cone": "N",
-    "impulse cone": "N s",
-}
-"""Units of the constraints; where a constraint holds positions and velocities, the former's."""
-
 
 @dataclass(frozen=True, eq=False)
 class Unknown:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -23,9 +23,6 @@ from ..robot import Robot
 from .problem import ForceProblem, SaddlePoint, force_problem, saddle_point
 from .qp import cone_sides, constrained_forces
 
-if TYPE_CHECKING:
-    from ..gait import Gait
-
 GUIDE_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 """Base coordinates that a guide can hold."""
 
@@ -34,6 +31,45 @@ SAGITTAL_GUIDE = ("y", "roll", "pitch", "yaw")
 
 _TOLERANCE = 1e-6
 """Violation up to which a solution counts as feasible [N, N m]."""
+
+
+class Accelerations(Protocol):
+    """A motion at n instants; a `gait.Motion` is one."""
+
+    @property
+    def q(self) -> Array:
+        """Configurations, shape (n, 19)."""
+
+    @property
+    def v(self) -> Array:
+        """Velocities, shape (n, 18)."""
+
+    @property
+    def a(self) -> Array:
+        """Accelerations, shape (n, 18)."""
+
+
+class StridePhase(Protocol):
+    """A phase of a stride; a `gait.GaitPhase` is one."""
+
+    @property
+    def feet(self) -> tuple[str, ...]:
+        """Legs whose feet stand on the ground."""
+
+    def motion(self, robot: Robot, s: Array) -> Accelerations:
+        """The motion at phases s (n,) from 0 to 1."""
+
+
+class Stride(Protocol):
+    """A stance and a flight, whose inverse dynamics are asked for; a `gait.Gait` is one."""
+
+    @property
+    def stance(self) -> StridePhase:
+        """The phase on the ground."""
+
+    @property
+    def flight(self) -> StridePhase:
+        """The phase in the air."""
 
 
 class InverseDynamics(NamedTuple):
@@ -139,7 +175,7 @@ def inverse_dynamics(
 
 def feedforward(
     robot: Robot,
-    gait: Gait,
+    gait: Stride,
     *,
     samples: int = 101,
     contact: Contact = "point",
@@ -155,7 +191,7 @@ def feedforward(
 
     Args:
         robot: The robot.
-        gait: The gait.
+        gait: The gait, or whatever has a stance and a flight.
         samples: Number of phases, at least 2.
         contact: See `inverse_dynamics`, as the following.
         friction: For stance.

@@ -16,8 +16,8 @@ from pronk_pin.control import (
     lifted_model,
     phase_grid,
 )
-from pronk_pin.control.guided import Rotors
 from pronk_pin.control.rehearsal import rehearse
+from pronk_pin.dynamics import Rotors
 from pronk_pin.gait import load_library
 from pronk_pin.robot import Robot
 

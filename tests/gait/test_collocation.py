@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from pronk_pin.gait import GaitProblem, GaitSolution, vertical_hop
+from pronk_pin.gait.checks import UNITS
 from pronk_pin.gait.collocation import _apex, node_phases, transcribe
-from pronk_pin.gait.transcription import UNITS
 from pronk_pin.robot import Robot
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin.dynamics import contact_jacobian
+from pronk_pin.dynamics import contact_jacobian, planar_rows
 from pronk_pin.errors import FileProblem, InvalidInput, SpeedOutOfRange
 from pronk_pin.gait import (
     SPEEDS,
@@ -21,7 +21,6 @@ from pronk_pin.gait import (
     load_library,
     load_style,
 )
-from pronk_pin.gait.reintegration import guided_rows
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot
 
@@ -75,7 +74,7 @@ def test_motion_is_periodic_and_smooth_at_lift_off(gait: Gait) -> None:
 
 def test_touchdown_stops_the_feet_by_a_plastic_impact(gait: Gait, robot: Robot) -> None:
     before, after = gait.flight.motion(robot, ENDS), gait.stance.motion(robot, ENDS)
-    rows, q, v = guided_rows(robot), after.q[0], before.v[1]
+    rows, q, v = planar_rows(robot), after.q[0], before.v[1]
     contact = "rolling"
     jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
     np.testing.assert_allclose(jacobian @ after.v[0, rows], 0.0, atol=1e-8)
@@ -119,7 +118,7 @@ def test_both_sides_mirror_each_other(gait: Gait) -> None:
 
 def test_bezier_form_obeys_the_equations_of_motion(gait: Gait, robot: Robot) -> None:
     """Within what the fits lose; the audit knows the optimised motion to 1e-10."""
-    contact, rows = "rolling", guided_rows(robot)
+    contact, rows = "rolling", planar_rows(robot)
     motion = gait.stance.motion(robot, S)
     for q, v, a, tau, lam in zip(motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True):
         force = pin.rnea(robot.model, robot.data, q, v, a).copy()

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin.dynamics import contact_jacobian
+from pronk_pin.dynamics import contact_jacobian, planar_rows
 from pronk_pin.errors import GaitNotFound, InvalidInput, UnknownName
 from pronk_pin.gait import (
     BOUND,
@@ -16,12 +16,12 @@ from pronk_pin.gait import (
     GaitLibrary,
     GaitProblem,
     GaitSolution,
+    audit,
     gait_problem,
     optimize_gait,
     vertical_hop,
 )
 from pronk_pin.gait.checks import TOLERANCE
-from pronk_pin.gait.reintegration import guided_rows
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot, load_robot
 
@@ -50,7 +50,7 @@ def test_neighbour_gives_a_quick_start(solution: GaitSolution, library: GaitLibr
 def test_touchdown_is_the_plastic_impact_of_the_whole_robot(solution: GaitSolution) -> None:
     robot, contact = solution.problem.robot, solution.problem.contact
     before, after = solution.motions["flight"], solution.motions["stance"]
-    rows, q, v = guided_rows(robot), after.q[0], before.v[-1]
+    rows, q, v = planar_rows(robot), after.q[0], before.v[-1]
     mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]
     jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
     kkt = np.block([[mass, -jacobian.T], [jacobian, np.zeros((12, 12))]])
@@ -104,11 +104,11 @@ def test_unlike_legs_get_torques_and_impulses_of_their_own() -> None:
     """The Go1's URDF is not its own mirror image; the motion is, and obeys every row."""
     go1 = load_robot("go1")
     found = optimize_gait(GaitProblem(go1, 0.3).remeshed(COARSE))
-    assert found.audit(refine=False)["18-DoF residual"].value < 1e-8
+    assert audit(found, refine=False)["18-DoF residual"].value < 1e-8
     tau = found.motions["flight"].tau
     assert np.max(np.abs(tau[:, 1:3] - tau[:, 4:6])) > 0.01
     before, after = found.motions["flight"], found.motions["stance"]
-    rows, q = guided_rows(go1), after.q[0]
+    rows, q = planar_rows(go1), after.q[0]
     jump = pin.crba(go1.model, go1.data, q) @ (after.v[0] - before.v[-1])
     push = contact_jacobian(go1, q, contact="rolling").T @ found.impulses["stance"].ravel()
     np.testing.assert_allclose(push[rows], jump[rows], atol=1e-8)
@@ -117,10 +117,10 @@ def test_unlike_legs_get_torques_and_impulses_of_their_own() -> None:
 def test_a_pitching_trunk_has_no_moment_about_its_pitch_axis(robot: Robot) -> None:
     problem = gait_problem(robot, 0.0, gait="bound").remeshed((6, 6, 6, 6))
     found = optimize_gait(problem)
-    audit = found.audit(refine=False)
-    assert audit["18-DoF residual"].value < 1e-8
+    report = audit(found, refine=False)
+    assert report["18-DoF residual"].value < 1e-8
     # All that the guide still takes is what the trunk's centre of mass lies off the mirror plane.
-    assert audit["guide"].value < 1.0
+    assert report["guide"].value < 1.0
     pitch = [2 * np.arcsin(motion.q[:, 4]) for motion in found.motions.values()]
     assert 0.1 < np.max(np.abs(np.concatenate(pitch))) <= problem.pitch_limit + 1e-8
 

@@ -1,17 +1,16 @@
-"""What did it learn? From a result to an `Explanation`."""
+"""What did it learn? From the strides of a simulation to an `Explanation`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from ..._checks import Interval, instance_of, known_name, real, sequence_of, shown, whole
+from ..._checks import Interval, instance_of, known_name, real, sequence_of, whole
 from ...control import CONTROLLERS
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
@@ -24,9 +23,6 @@ from .ground import Ground, survey
 from .recording import PARTS, PhaseRecording, recordings
 from .shares import share_table, shares
 from .terms import TERMS, Term, parameters, truth
-
-if TYPE_CHECKING:
-    from ..results import Results  # which imports the experiments, which explain
 
 IMU_NOISE = Interval(0, 1000, "m/s^2")
 DRAWS = Interval(2, 1_000_000)
@@ -103,10 +99,8 @@ class Explanation:
 
 
 def explain(
-    result: Results | xr.Dataset,
+    strides: xr.Dataset,
     *,
-    controller: str = "ilc",
-    scenario: str | None = None,
     terms: tuple[Term, ...] = TERMS,
     parts: Sequence[str] = PARTS,
     gaits: Sequence[Gait] | None = None,
@@ -117,9 +111,7 @@ def explain(
     """Take the torque that was learned apart into what the model lacks.
 
     Args:
-        result: A result, or the strides of one of its cells.
-        controller: Which controller of a result.
-        scenario: Which scenario of a result; by default the first.
+        strides: The strides of one cell, as `Results.strides` reads them.
         terms: What the model may lack.
         parts: Which phases to use.
         gaits: The gaits that were played, one for each speed; by default the shipped ones.
@@ -128,20 +120,13 @@ def explain(
         rng: Source of the draws and of that noise; by default one that starts at 0.
 
     Raises:
-        InvalidInput: The base is not locked, the result has no ticks, or too few strides.
+        InvalidInput: The base is not locked, the strides have no ticks, or too few strides.
     """
     imu_noise, draws = real("imu_noise", imu_noise, IMU_NOISE), whole("draws", draws, DRAWS)
     parts = sequence_of("parts", parts, lambda k, part: known_name("part", part, PARTS))
     if rng is not None:
         instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
-    if isinstance(result, xr.Dataset):
-        strides = result
-    elif not callable(getattr(result, "strides", None)):
-        raise InvalidInput(
-            f"result={shown(result)} is no result; give Results.load(folder), or its strides"
-        )
-    else:
-        strides = result.strides(result.find(controller=controller, scenario=scenario))
+    instance_of("strides", strides, xr.Dataset, "the strides of a cell, as Results.strides() reads")
     if strides.attrs.get("base", "locked") != "locked":
         raise InvalidInput(
             f"explain needs a locked base, not '{strides.attrs['base']}': run the comparison with "

@@ -1,21 +1,89 @@
-"""Linear dynamics of the guided robot: its trunk held to x and z, all feet standing or none.
+"""Dynamics of a robot whose trunk a guide holds to the sagittal plane, and their derivatives.
 
-The guide takes the trunk's y and its rotations. What is left free are x, z and the joints, 14
-coordinates y with the rates y'; a derivative is by these.
+The guide takes the trunk's y, roll and yaw, and, where the base is locked, its pitch. Left free are
+x, z, perhaps pitch, and the joints: 14 or 15 coordinates y with the rates y'. On their rows eq. (5)
+holds as it stands, and eq. (2) in flight; the guide's forces are in the others.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from .._typing import Array
-from ..dynamics import Contact, contact_jacobian
-from ..dynamics.derivatives import partials
-from ..gait.reintegration import guided_equations, guided_rows
+from .._typing import Array, IntArray
+from ..base import Base
+from ..kinematics.contacts import Contact, contact_bias, contact_jacobian
 from ..robot import NB, Robot
+from .derivatives import partials
+
+
+def planar_rows(robot: Robot, base: Base = "locked") -> IntArray:
+    """Indices of the velocities that the guide leaves free: x, z, perhaps pitch, and the joints.
+
+    x and z are those of the trunk, which stay in the sagittal plane.
+    """
+    free = (0, 2, 4) if base == "sagittal" else (0, 2)
+    return np.array([*free, *range(NB, robot.nv)], dtype=np.intp)
+
+
+def planar_equations(
+    robot: Robot,
+    q: Array,
+    v: Array,
+    tau: Array,
+    *,
+    contact: Contact = "rolling",
+    feet: Sequence[str] = (),
+    base: Base = "locked",
+) -> tuple[Array, Array]:
+    """Matrix and right-hand side of eq. (5) on the rows that the guide leaves free, (2) in flight.
+
+    Arguments are those of `planar_dynamics`. The unknowns are the accelerations of the free rows,
+    and the contact forces of the feet.
+    """
+    rows = planar_rows(robot, base)
+    mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14 or 15, ...)
+    force = np.concatenate([np.zeros(NB), robot.joint_torques(tau, v[NB:])])
+    force = (force - pin.nonLinearEffects(robot.model, robot.data, q, v))[rows]
+    if not feet:
+        return mass, force
+    jacobian = contact_jacobian(robot, q, feet=feet, contact=contact)[:, rows]
+    bias = contact_bias(robot, q, v, feet=feet, contact=contact)
+    corner = np.zeros((len(jacobian), len(jacobian)))
+    return np.block([[mass, -jacobian.T], [jacobian, corner]]), np.concatenate([force, -bias])
+
+
+def planar_dynamics(
+    robot: Robot,
+    q: Array,
+    v: Array,
+    tau: Array,
+    *,
+    contact: Contact = "rolling",
+    feet: Sequence[str] = (),
+    base: Base = "locked",
+) -> Array:
+    """Acceleration of the guided robot: eq. (5) of the feet that stand, or (2) without any.
+
+    Args:
+        robot: The robot.
+        q: Configuration, shape (19,).
+        v: Velocity, shape (18,).
+        tau: Motor torques [N m], shape (12,).
+        contact: How feet stand on the ground.
+        feet: The legs whose feet stand.
+        base: What the guide leaves the trunk.
+
+    Returns:
+        Acceleration, shape (18,), zero where the guide holds the trunk.
+    """
+    rows, a = planar_rows(robot, base), np.zeros(robot.nv)
+    kkt, right = planar_equations(robot, q, v, tau, contact=contact, feet=feet, base=base)
+    a[rows] = np.linalg.solve(kkt, right)[: len(rows)]
+    return a
 
 
 class Rotors(NamedTuple):
@@ -31,7 +99,7 @@ NO_ROTORS = Rotors()
 """The URDF as it stands."""
 
 
-class GuidedDerivatives(NamedTuple):
+class PlanarDerivatives(NamedTuple):
     """Derivatives of the guided robot's acceleration at one state."""
 
     a: Array
@@ -44,7 +112,7 @@ class GuidedDerivatives(NamedTuple):
     """By the motor torques, shape (14, 12)."""
 
 
-def guided_derivatives(
+def planar_derivatives(
     robot: Robot,
     q: Array,
     v: Array,
@@ -52,7 +120,7 @@ def guided_derivatives(
     *,
     contact: Contact | None = None,
     rotors: Rotors = NO_ROTORS,
-) -> GuidedDerivatives:
+) -> PlanarDerivatives:
     """Eq. (5), or (2) in flight, solved on the guided rows and differentiated as a whole.
 
     With r(q, v, a, lam) = M a + H v + G - J^T lam and c(q, v, a) the contact points' acceleration,
@@ -68,7 +136,7 @@ def guided_derivatives(
         contact: How all the feet stand on the ground; None in flight.
         rotors: What the joints add to the URDF.
     """
-    rows = guided_rows(robot)
+    rows = planar_rows(robot)
     free = len(rows)
     motors = robot.parameters.torque_constant * np.eye(robot.nv, robot.nu, k=-NB)[rows]  # (14, 12)
     kkt, right = _equations(robot, q, v, tau, contact, rotors)
@@ -84,10 +152,10 @@ def guided_derivatives(
     r_v = r_v[rows] + rotors.damping * np.diag(_joints(robot))
     sides = np.block([[-r_q[rows], -r_v, motors], [-c_q, -c_v, np.zeros((len(c_q), robot.nu))]])
     da_dy, da_dv, da_dtau = np.hsplit(np.linalg.solve(kkt, sides)[:free], [free, 2 * free])
-    return GuidedDerivatives(a[rows], da_dy, da_dv, da_dtau)
+    return PlanarDerivatives(a[rows], da_dy, da_dv, da_dtau)
 
 
-def guided_acceleration(
+def planar_acceleration(
     robot: Robot,
     q: Array,
     v: Array,
@@ -98,18 +166,18 @@ def guided_acceleration(
 ) -> tuple[Array, float]:
     """The acceleration alone, shape (14,), and the force of the ground, up, on all feet [N].
 
-    Arguments of `guided_derivatives`.
+    Arguments of `planar_derivatives`.
     """
     kkt, right = _equations(robot, q, v, tau, contact, rotors)
-    a, lam = np.split(np.linalg.solve(kkt, right), [len(guided_rows(robot))])
+    a, lam = np.split(np.linalg.solve(kkt, right), [len(planar_rows(robot))])
     return a, float(lam[2::3].sum())
 
 
-def guided_impact(
+def planar_impact(
     robot: Robot, q: Array, v: Array, *, contact: Contact, rotors: Rotors = NO_ROTORS
 ) -> Array:
     """Rates (m, 14) after a plastic impact of all feet, from rates (m, 14) before it."""
-    rows = guided_rows(robot)
+    rows = planar_rows(robot)
     mass = _mass(robot, q, rotors)
     jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]
     answer = np.linalg.solve(mass, jacobian.T)
@@ -122,16 +190,16 @@ def _equations(
 ) -> tuple[Array, Array]:
     """Matrix and right-hand side of eq. (5) on the free rows, with what the joints add."""
     feet = () if contact is None else robot.legs
-    kkt, right = guided_equations(robot, q, v, tau, contact=contact or "rolling", feet=feet)
+    kkt, right = planar_equations(robot, q, v, tau, contact=contact or "rolling", feet=feet)
     joints = _joints(robot)
     free = np.arange(len(joints))
     kkt[free, free] += rotors.armature * joints
-    right[free] -= rotors.damping * joints * v[guided_rows(robot)]
+    right[free] -= rotors.damping * joints * v[planar_rows(robot)]
     return kkt, right
 
 
 def _mass(robot: Robot, q: Array, rotors: Rotors) -> Array:
-    rows = guided_rows(robot)
+    rows = planar_rows(robot)
     mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]
     return np.asarray(mass + rotors.armature * np.diag(_joints(robot)))
 

@@ -1,0 +1,11 @@
+"""How a trunk may move: the words for it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Base = Literal["locked", "sagittal"]
+"""Trunks whose gaits are planar: along x and z only, as in the paper, or pitching too."""
+
+BASES = ("locked", "sagittal", "free")
+"""How a trunk may move: along x and z only, pitching too, or anyhow."""
