@@ -26,6 +26,10 @@ class _Runs(Protocol):
     def run(self) -> int | None: ...
 
 
+RENAMED: dict[str, str] = {}
+"""Options that the last release knew by another name, with their names of today."""
+
+
 def _commands(arguments: list[str]) -> Any:
     """All commands; the defaults of `compare` are those of the suite that is asked for."""
     words = [word for argument in arguments for word in argument.split("=", 1)]
@@ -52,9 +56,10 @@ Command = (
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; the exit code is 0, 1 for an error of ours or models that differ, 2 for wrong
     usage, 130 on Ctrl-C."""
+    arguments = todays_options(sys.argv[1:] if arguments is None else arguments)
     try:
         command: _Runs = tyro.cli(
-            _commands(sys.argv[1:] if arguments is None else arguments),
+            _commands(arguments),
             prog="pronk-pin",
             description="When a legged robot repeats a motion, does practice beat the model?",
             args=arguments,
@@ -70,6 +75,28 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("pronk-pin: interrupted", file=sys.stderr)
         return 130
+
+
+def todays_options(arguments: list[str]) -> list[str]:
+    """Replace options of the last release by their names of today, with a warning for each.
+
+    As on the command line, `--name value` and `--name=value` are the same, and so are hyphens and
+    underscores. What is no option stays as it is.
+    """
+    replaced = []
+    for argument in arguments:
+        option, equals, value = argument.partition("=")
+        today = RENAMED.get(option.replace("_", "-"))
+        if today is not None:
+            _show_warning(
+                f"{option} is called {today} now; the old name goes with the next release",
+                FutureWarning,
+                __file__,
+                0,
+            )
+            argument = f"{today}{equals}{value}"
+        replaced.append(argument)
+    return replaced
 
 
 def _show_warning(
