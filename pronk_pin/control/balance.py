@@ -1,4 +1,4 @@
-"""Keeping a trunk up that is free to turn: what is added to the tapes at every tick.
+"""Balance of a trunk that is free to turn: torques added to the tapes at every tick.
 
 On the ground a moment on the trunk is spread over the contact forces within their friction cones,
 and the legs' transposed Jacobians turn what the forces change into torques. In the air the feet are
@@ -28,11 +28,11 @@ from .tape import Gains
 
 @dataclass(frozen=True)
 class BalanceSpec:
-    """How a trunk that is free to turn is kept up.
+    """Parameters of the balance of a trunk that is free to turn.
 
     Attributes:
-        attitude: On the ground.
-        placement: In the air.
+        attitude: Attitude regulation, on the ground.
+        placement: Foot placement, in the air.
         learned: Share of a deviation from the gait's attitude that the legs learn to undo in
             stance. With all of it (1) learning, which sees the trunk a stride late, and this
             regulation throw the trunk to and fro over tens of strides, the more the faster the
@@ -55,7 +55,11 @@ class BalanceSpec:
 
 
 class Balance:
-    """Runs one `BalanceSpec` on n robots, each with its own gait.
+    """Attitude regulation and foot placement of n robots, each with its own gait.
+
+    On the ground the regulating moment m is a change of the contact forces within their cones,
+    `sum r_l x dlam_l = m`, and of the torques, `dtau_l = -J_l^T dlam_l`; in the air the references
+    of the joints are those of the displaced feet, `dtau = Kp (q_placed - q_d)`.
 
     Args:
         robot: The robot.
@@ -100,7 +104,7 @@ class Balance:
         return self._reference[:, 0, 0].copy()
 
     def lift_off(self, rows: IntArray, sideways: Array) -> None:
-        """Robots leave the ground with speeds (m,) sideways [m/s], in the world."""
+        """Note the sideways speeds (m,) with which robots leave the ground, in the world [m/s]."""
         self._aside[rows] = self._spec.placement.aside(sideways)
 
     def torque(
@@ -112,14 +116,14 @@ class Balance:
         joints: Array,
         reference: Array,
     ) -> Array:
-        """What to add to the tapes' torques at one tick [N m], shape (m, 12).
+        """Compute the balancing torques at one tick, to add to the tapes' [N m], shape (m, 12).
 
         Args:
             part: Part of the stride, an index into `PARTS`.
             rows: Which robots.
             tick: Tick of their tapes.
-            trunk: What they believe of their trunks, in Pinocchio's layout: position and
-                quaternion (m, 7), velocity (m, 6).
+            trunk: Estimated state of their trunks, in Pinocchio's layout: position and quaternion
+                (m, 7), velocity (m, 6).
             joints: Their joint angles [rad], shape (m, 12).
             reference: The tapes' joint angles [rad], shape (m, 12).
         """
@@ -132,14 +136,14 @@ class Balance:
         return added
 
     def unlearned(self, rows: IntArray, pose: Array, reference: Array) -> Array:
-        """What of the joints' errors in stance regulation keeps from the learning [rad].
+        """Joint errors in stance that are left to the attitude regulation, not learned [rad].
 
-        That is, but for the share that is learned, what the joints are off because the trunk is
-        turned from the gait's attitude over feet that stand where they are.
+        `(1 - learned) (q_d - q_turned)`: q_turned are the joint angles of the gait's posture over
+        feet that stand where they are, with the trunk turned as it is.
 
         Args:
             rows: Which robots.
-            pose: What they believe of their trunks at each tick, shape (m, ticks, 7).
+            pose: Estimated pose of their trunks at each tick, shape (m, ticks, 7).
             reference: The joints' references [rad], shape (m, ticks, 12).
 
         Returns:

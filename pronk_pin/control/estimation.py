@@ -1,4 +1,4 @@
-"""What the controller believes of its speed and its attitude.
+"""Estimation of the trunk's speed (leg odometry) and attitude (gyro and accelerometer).
 
 Speed: leg odometry and a first-order filter. In stance the feet do not slip, so the joint encoders
 tell the trunk's speed; in flight it stays as it was at lift-off. Section II.E of the paper. With an
@@ -24,7 +24,9 @@ from .record import PhaseLog
 
 
 class SpeedEstimator:
-    """Forward speed of n robots, one estimate a stride.
+    """Estimator of the forward speed of n robots, one estimate a stride (section II.E).
+
+    Leg odometry through a first-order low-pass, `T v' = v_legs - v`, over the ticks of stance.
 
     Attributes:
         speed: The estimates [m/s], shape (n,).
@@ -38,10 +40,10 @@ class SpeedEstimator:
         self.speed, self.sideways = np.zeros((2, n))
 
     def update(self, rows: IntArray, log: PhaseLog) -> Array:
-        """Take in a stance that some robots have just finished; their new estimates [m/s].
+        """Update the estimates of robots that have just finished a stance, and return them [m/s].
 
-        With an accelerometer it is the complementary filter T v' = v_legs - v + T a: that of the
-        legs' speed at low, of the integrated acceleration at high frequencies.
+        With an accelerometer it is the complementary filter `T v' = v_legs - v + T a`: the legs'
+        speed at low, the integrated acceleration at high frequencies.
 
         Where a sensor failed the estimate stays as it was.
         """
@@ -87,6 +89,12 @@ class SpeedEstimator:
 class AttitudeFilter:
     """The explicit complementary filter on SO(3) of Mahony, Hamel and Pflimlin (2008).
 
+    With the attitude R, the gyro's rate w, the specific force f and gravity g,
+
+        R' = R (w - b_w + k (f - b_f) / g x R^T e_z)^,
+
+    where b_w and b_f are the biases at rest and e_z is the vertical.
+
     The accelerometer's vector is not normalised: in flight it tells nothing and weighs nothing,
     and over a stride of steady pronking, which begins and ends at the same speed, its mean is the
     vertical. Nothing holds the heading but a gyro whose bias was taken away at rest.
@@ -95,8 +103,8 @@ class AttitudeFilter:
     is, in the mean, taken for the bias.
 
     Attributes:
-        gain: At which a wrong attitude is righted [1/s].
-        rest: For how long it lies there [s].
+        gain: Gain k of the correction by the accelerometer [1/s].
+        rest: Time at rest in which the biases are estimated [s].
     """
 
     gain: float = 0.1
@@ -108,7 +116,7 @@ class AttitudeFilter:
 
 
 class AttitudeEstimator:
-    """The attitudes of n robots, tick by tick.
+    """Attitude estimator of n robots by an `AttitudeFilter`, tick by tick.
 
     Args:
         spec: The filter.
@@ -139,7 +147,7 @@ class AttitudeEstimator:
         self.rate = np.zeros_like(turning)
 
     def update(self, rows: IntArray, gyro: Array, specific_force: Array) -> None:
-        """Take in one reading of some robots' IMUs; one that is not finite changes nothing.
+        """Update by one reading of some robots' IMUs; one that is not finite changes nothing.
 
         Args:
             rows: Which robots.
@@ -162,7 +170,7 @@ _LEVEL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def _trunk(log: PhaseLog, n: int, ticks: int) -> tuple[Array, Array]:
-    """Trunk's pose (n, ticks, 7) and velocity (n, ticks, 6): level where nothing else is known."""
+    """Trunk's pose (n, ticks, 7) and velocity (n, ticks, 6), level where the log has none."""
     if log.pose is not None and log.twist is not None:
         return log.pose[:, :ticks].copy(), log.twist[:, :ticks].copy()
     return np.tile(_LEVEL, (n, ticks, 1)), np.zeros((n, ticks, 6))

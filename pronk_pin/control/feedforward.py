@@ -1,4 +1,4 @@
-"""The model's feedforward: contact inverse dynamics along the gait, on the phase grid."""
+"""Model-based feedforward: contact inverse dynamics along the gait, on the phase grid."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ GUIDES: dict[str, tuple[str, ...] | None] = {
     "sagittal": ("y", "roll", "yaw"),
     "free": None,
 }
-"""What a guide holds of the trunk, by how it may move: x and z only, pitch too, or anyhow."""
+"""Trunk coordinates that the planar constraint holds, by base: all but x and z, or but x, z
+and pitch, or none."""
 
 BASES = tuple(GUIDES)
-"""How a trunk may move."""
+"""Bases: how the trunk may move."""
 
 
 def model_feedforward(
@@ -32,9 +33,9 @@ def model_feedforward(
     friction: float = 0.6,
     base: str = "locked",
 ) -> Array:
-    """Torques that the model asks for in stance and flight of each gait [N m].
+    """Compute the inverse-dynamics torques in stance and flight of each gait: eq. (2) [N m].
 
-    Shape (n, 2, samples, 12). Where the base is free, the legs hold what a guide would.
+    Shape (n, 2, samples, 12). Where the base is free, the legs hold what the constraint would.
 
     Raises:
         UnknownName: There is no such base; see `BASES`.

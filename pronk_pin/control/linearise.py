@@ -1,6 +1,6 @@
-"""The lifted model of a gait: its strides under feedback, linearised tick by tick.
+"""Lifted model of a gait: its strides under feedback, linearised tick by tick.
 
-The guided model settles on an orbit near the gait, and along that orbit its strides are linearised.
+The planar model settles on an orbit near the gait, and along that orbit its strides are linearised.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _STEP = 1e-6
 def lifted_model(
     robot: Robot, gait: Gait, settings: Settings, *, rotors: Rotors = NO_ROTORS
 ) -> LiftedModel:
-    """The lifted model of a gait: what changes of the feedforward do, to first order.
+    """Compute the lifted model of a gait: the first-order response to changes of the feedforward.
 
     The state at touchdown holds the coordinates x, z and the joints, their rates, and the estimate
     of the speed, 29 in all; x is 0 at every touchdown, since no place is like another.
@@ -30,16 +30,16 @@ def lifted_model(
         robot: The robot.
         gait: The gait.
         settings: The controller's.
-        rotors: What the joints add to the URDF.
+        rotors: Rotor inertia and friction of the joints beyond the URDF.
 
-    Raises:
+        Raises:
         InvalidInput: The model does not settle on an orbit near the gait.
     """
     return _Linearised(robot, gait, settings, rotors).lifted()
 
 
 class _Linearised(GuidedStrides):
-    """Strides of the guided model, and what small changes do to them."""
+    """Strides of the planar model, and their linearisation."""
 
     def lifted(self) -> LiftedModel:
         """The lifted model along the orbit."""
@@ -65,7 +65,7 @@ class _Linearised(GuidedStrides):
         )
 
     def steps(self, phase: PlayedPhase, *, odometry: bool) -> list[tuple[Array, Array]]:
-        """A tick of the state under feedback, (29, 29), and its input, (29, 12), at each tick."""
+        """A_k (29, 29) and B_k (29, 12) of `x_{k+1} = A_k x_k + B_k u_k` under feedback."""
         dt, steps = self.settings.timestep, []
         share = dt / (self.settings.speed_filter + dt)
         kp, kd = _on_joints(self.kp), _on_joints(self.kd)
@@ -92,7 +92,7 @@ class _Linearised(GuidedStrides):
         return steps
 
     def flown(self, flight: PlayedPhase) -> Array:
-        """The state at the last tick of flight by that at lift-off, legs turned by the speed."""
+        """Derivative of the state at the last tick of flight by that at lift-off, with eq. (12)."""
         ticks = len(flight.torques)
         thigh = np.tile([0.0, 1.0, 0.0], NL // 3)
         # A turn of the reference by one radian acts as the feedback's torque does.
@@ -104,7 +104,10 @@ class _Linearised(GuidedStrides):
         return np.asarray(end)
 
     def touchdown(self, landing: Array, tick: int) -> Array:
-        """The state at which stance begins by that at the last tick of flight, (29, 29)."""
+        """Derivative of the state after the impact by that at the last tick of flight, (29, 29).
+
+        The saltation matrix: `dx+/dx- (1 - x' grad h^T / (grad h . x'))` for the feet's height h.
+        """
         step = _STEP * np.eye(STATES)[: FREE + FREE]
         q = self.q(landing)
         height = np.array(
@@ -133,11 +136,11 @@ class _Linearised(GuidedStrides):
 
 
 def _propagate(steps: list[tuple[Array, Array]], inputs: Array) -> tuple[Array, Array]:
-    """The states at each tick, and after the last: by the inputs, and by the first state.
+    """Derivatives of the states at each tick and after the last, by inputs and first state.
 
     Args:
         steps: The ticks.
-        inputs: What pushes at each tick, shape (ticks, 12, m).
+        inputs: Torques at each tick for m inputs, shape (ticks, 12, m).
 
     Returns:
         Shapes (ticks + 1, 29, m) and (ticks + 1, 29, 29).

@@ -1,4 +1,4 @@
-"""A practice rehearsed in the model: learning as it would go if the model were the robot.
+"""Rehearsal: learning simulated in the planar model, as if the model were the robot.
 
 The lifted model is a first-order one, and a law that changes its feedforward in large steps leaves
 its range: legs that swing at 20 rad/s are held once the flight's reference has ended, so that a
@@ -18,12 +18,12 @@ from .record import StrideRecord
 
 
 def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, number: int) -> Array:
-    """Errors of the strides of learning, by the model's own practice [rad].
+    """Predict the errors of the strides of learning by simulating them in the model [rad].
 
-    What the model gets wrong of the stride before the learning is taken to stay as it is.
+    The model's error in the stride before the learning is taken to stay as it is.
 
     Args:
-        strides: The model's; they are told the feedforwards of the practice.
+        strides: The strides of the planar model, whose feedforward is set.
         law: The law of the stance.
         begin: The last stride before learning, of one robot.
         number: How many strides of learning.
