@@ -1,4 +1,4 @@
-"""The one place where states, feet and options that a user passes in are checked.
+"""Validation of the states, feet and options that a user passes in.
 
 Leading dimensions are a batch: `(..., 19)` is one configuration or any batch of them.
 """
@@ -31,7 +31,7 @@ REFUSALS = (TypeError, ValueError, AttributeError)
 
 
 def sound_base(q: npt.ArrayLike) -> bool:
-    """Whether q is one array with a finite position and a unit quaternion: a quick look.
+    """Whether q is one array with a finite position and a unit quaternion; a quick check.
 
     Pinocchio's algorithms are so fast that checking every number would cost as much as they do.
     This looks at what they would not notice; NaN in joints and velocities shows in the result,
@@ -47,7 +47,7 @@ def sound_base(q: npt.ArrayLike) -> bool:
 
 
 def as_array(name: str, value: npt.ArrayLike, size: int, batch: tuple[int, ...] | None) -> Array:
-    """A finite float64 array of shape (*batch, size); a batch of None allows any.
+    """Convert to a finite float64 array of shape (*batch, size); a batch of None allows any.
 
     Raises:
         InvalidInput: Not numbers, not finite, or of another shape.
@@ -81,7 +81,7 @@ def _one_sound(value: Any, size: int) -> bool:
 
 
 def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
-    """A configuration (..., nq) with a unit base quaternion.
+    """Convert to a configuration (..., nq) with a unit base quaternion.
 
     Raises:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
@@ -103,7 +103,7 @@ def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
 
 
 def as_state(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, Array]:
-    """A configuration (..., nq) and a velocity (..., nv) of the same batch shape.
+    """Convert to a configuration (..., nq) and a velocity (..., nv) of the same batch shape.
 
     Raises:
         InvalidInput: As `as_q`, or v does not fit q.
@@ -113,7 +113,7 @@ def as_state(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, A
 
 
 def as_one(name: str, array: Array) -> Array:
-    """The array itself, if it is no batch.
+    """Return the array itself, if it is no batch.
 
     Raises:
         InvalidInput: It has leading dimensions.
@@ -147,7 +147,7 @@ def _leg_indices(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, ...]
 
 
 def known_name(kind: str, name: str, known: Collection[str]) -> str:
-    """The name itself, if it is known.
+    """Return the name itself, if it is known.
 
     Raises:
         UnknownName: It is not.

@@ -121,7 +121,7 @@ def stance_derivatives(
 
 
 def _of_motors(robot: Robot, v: Array, by_v: Array, by_force: Array) -> tuple[Array, Array]:
-    """Derivatives by v and by the motors' torques, of what depends on the joints' torques."""
+    """Derivatives by v and motor torques, by chain rule from those by v and joint torques."""
     if robot.parameters.ideal_motors:
         return by_v, by_force
     by_v = by_v.copy()
@@ -161,7 +161,7 @@ def partials(
     legs: Sequence[int],
     radius: float,
 ) -> tuple[Array, Array, Array, Array]:
-    """r_q, r_v (18, 18) and c_q, c_v (3 feet, 18) of `_implicit`, at a motion (q, v, a)."""
+    """Partial derivatives r_q, r_v (18, 18), c_q, c_v (3 feet, 18) of `_implicit` at (q, v, a)."""
     model, data = robot.model, robot.data
     lever = np.array([0.0, 0.0, -radius])
     pin.computeForwardKinematicsDerivatives(model, data, *motion)

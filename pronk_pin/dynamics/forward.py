@@ -27,7 +27,7 @@ from .terms import mass_matrix, nonlinear_effects, quick_result, selection_matri
 
 
 class StanceDae(NamedTuple):
-    """The linear equations of stance, eq. (5): matrix [a, lam] = rhs."""
+    """Linear equations of stance, eq. (5): matrix [a, lam] = rhs."""
 
     matrix: Array
     """[[M, -J^T], [J, 0]], shape (18 + 3 feet, 18 + 3 feet)."""
@@ -133,7 +133,7 @@ def stance_dae(
     feet: Iterable[str] | None = None,
     contact: Contact = "point",
 ) -> StanceDae:
-    """The matrix and right-hand side of eq. (5).
+    """Assemble the matrix and right-hand side of eq. (5).
 
     Arguments and errors are those of `stance_dynamics`, for one state.
     """

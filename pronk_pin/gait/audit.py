@@ -1,4 +1,4 @@
-"""Is a gait right? Each claim about a solution, checked by other means than the solver's.
+"""Audit of gait solutions: each claim checked by other means than the solver's.
 
 The named constraints are evaluated on the collocation's own expressions. Everything else is seen
 with Pinocchio's model of the whole robot, which the optimisation never touched, and by solving once
@@ -62,7 +62,7 @@ def audit(solution: GaitSolution, *, refine: bool = True) -> Audit:
 
 
 class BezierLoss(NamedTuple):
-    """What Bezier polynomials of one order lose against the optimised motion of a phase."""
+    """Errors of Bezier polynomials of one order against the optimised motion of a phase."""
 
     order: int
     joints: float
@@ -72,7 +72,7 @@ class BezierLoss(NamedTuple):
 
 
 def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
-    """Why a phase has its Bezier order: what each order loses, by phase.
+    """Errors of the Bezier form by order, for each phase; they justify the orders in use.
 
     The errors are those at the nodes of the mesh, midpoints included.
     """
@@ -119,8 +119,8 @@ def _place(phase: str, time: float) -> str:
 
 
 def _residual(solution: GaitSolution) -> tuple[Check, Check]:
-    """Equations of motion (2) of the whole robot: in the rows that the guide leaves free nothing
-    must be missing; in the others, what the guide carries."""
+    """Residual of eq. (2) of the whole robot: zero on the planar rows, which the planar constraint
+    leaves free; on the others the constraint's forces."""
     robot, contact = solution.problem.robot, solution.problem.contact
     rows, free, guide = guided_rows(robot, solution.problem.base), {}, {}
     for name, motion in solution.motions.items():
@@ -131,7 +131,7 @@ def _residual(solution: GaitSolution) -> tuple[Check, Check]:
 
 
 def _symmetry(solution: GaitSolution) -> Check:
-    """Bilateral symmetry, seen where it matters: the feet stand mirrored in the world."""
+    """Bilateral symmetry: distance of the right feet from the mirror image of the left ones [m]."""
     robot = solution.problem.robot
     left = [i for i, leg in enumerate(robot.legs) if leg.endswith("L")]
     right = [i for i, leg in enumerate(robot.legs) if leg.endswith("R")]
@@ -144,8 +144,8 @@ def _symmetry(solution: GaitSolution) -> Check:
 
 
 def _apex(solution: GaitSolution) -> Check:
-    """The trunk's greatest height in flight, between the nodes too, or, with several flights, its
-    height in the middle of each."""
+    """Error of the apex [m]: the trunk's greatest height in flight, between the nodes too, or, with
+    several flights, its height in the middle of each."""
     flights, errors = [phase for phase in solution.gait.phases if not phase.feet], []
     for phase in flights:
         height = phase.base_reference(np.linspace(0.0, 1.0, 1001))[0][:, 1]
@@ -226,7 +226,7 @@ def _order(solution: GaitSolution, fine: float) -> Check:
 
 
 def _bezier(solution: GaitSolution) -> tuple[Check, ...]:
-    """What the Bezier form loses against the optimised motion."""
+    """Errors of the Bezier form against the optimised motion."""
     position, velocity, torque = {}, {}, {}
     for phase in solution.gait.phases:
         motion = solution.motions[phase.name]
@@ -243,7 +243,7 @@ def _bezier(solution: GaitSolution) -> tuple[Check, ...]:
 
 
 def _use(solution: GaitSolution) -> tuple[Check, ...]:
-    """How much of each limit the gait uses, and the force of the ground."""
+    """Share of each limit that the gait uses, and the total ground force [N]."""
     robot, motions = solution.problem.robot, solution.motions
     cone, total = {}, {}
     for name, motion, legs in _stances(solution):

@@ -1,4 +1,4 @@
-"""A gait library in words: one line for each gait, or one gait in detail."""
+"""Text of a gait library for a terminal: one line for each gait, or one gait in detail."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .library import GaitLibrary
 
 
 def describe_library(library: GaitLibrary) -> str:
-    """A table of the gaits and of what their audit found.
+    """Format the gaits and their audits as a table.
 
     Raises:
         InvalidInput: The library has no audit.
@@ -40,8 +40,7 @@ def describe_library(library: GaitLibrary) -> str:
 
 
 def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None) -> str:
-    """One gait in detail: its form, and its audit where it is one of the library's, or what its
-    interpolation leaves out where it is not.
+    """Format one gait: its phases, residuals, and its audit if it is one of the library's.
 
     Raises:
         SpeedOutOfRange: The library does not cover the speed.
@@ -74,7 +73,7 @@ def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None)
 
 
 def _why(losses: Sequence[Any], order: int) -> str:
-    """What the order and its neighbours lose over the whole library."""
+    """Worst errors of the order and its neighbours over the whole library."""
     near = [loss for loss in losses if abs(loss[0] - order) <= 2]
     parts = [f"{int(n)}: {joints:.1e} rad, {1e3 * feet:.2g} mm" for n, joints, feet in near]
     return "worst loss of joints and feet by order, " + "; ".join(parts)

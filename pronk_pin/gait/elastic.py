@@ -1,4 +1,4 @@
-"""Why a gait problem has no solution: its demands made elastic, its laws kept.
+"""Diagnosis of infeasible gait problems: demands made elastic, laws of motion kept.
 
 The laws of motion, contact and continuity are not negotiable; what is asked of the gait is. Each
 demand may give way by one number, in its own unit and in all its rows alike, and what gives way,
@@ -59,7 +59,7 @@ NOTABLE = 0.02
 
 
 def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] | None:
-    """By how much which demands have to give way, in their units, the worst first.
+    """Find the demands that conflict, and by how much each has to give way, the worst first.
 
     Args:
         program: The program without a solution.
@@ -115,7 +115,7 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] |
 
 
 def remedies(found: Mapping[str, float] | None) -> list[str]:
-    """What to try, each remedy once."""
+    """Remedies for conflicting demands, each once."""
     return list(dict.fromkeys(DEMANDS[name][1] for name in found or ()))
 
 

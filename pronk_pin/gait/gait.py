@@ -1,4 +1,4 @@
-"""A gait: what the robot should do over one stride, as Bezier polynomials over the phase.
+"""Gaits: periodic motions over one stride, as Bezier polynomials over the phase.
 
 A stride is a sequence of phases, each with its own set of stance feet. Pronking has two: `stance`
 on all four feet, then `flight` on none; the touchdown impact closes the cycle.

@@ -1,4 +1,4 @@
-"""From a gait problem to its solution."""
+"""Gait optimisation: from a gait problem to its solution, by IPOPT."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ _DERIVATIVES = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_h
 
 @dataclass(frozen=True, eq=False)
 class SolverState:
-    """Where the solver stopped, for a warm start.
+    """Final iterate of the solver, for a warm start.
 
     Attributes:
         x: The unknowns of the transcription.
@@ -182,8 +182,10 @@ def fit_phase(solution: GaitSolution, phase: ContactPhase) -> GaitPhase:
 
 
 def resampled(solution: GaitSolution, intervals: Sequence[int]) -> SolverState:
-    """A solution on another mesh, for a warm start there: the unknowns and their bounds'
-    multipliers interpolated, the constraints' multipliers left to the solver."""
+    """Interpolate a solution to another mesh, for a warm start there.
+
+    The unknowns and their bounds' multipliers are interpolated, the constraints' are zero.
+    """
     problem, before = solution.problem, _program(solution.problem)
     program = _program(problem.remeshed(intervals))
 
@@ -215,14 +217,14 @@ def _check_alike(initial: GaitProblem, problem: GaitProblem) -> None:
 
 
 def _fights(problem: GaitProblem) -> dict[str, float] | None:
-    """Which demands have to give way; a coarse mesh is enough to tell."""
+    """Find the conflicting demands, on a coarse mesh, which is enough to tell."""
     coarse = problem.remeshed([_COARSE] * len(problem.sequence))
     program = _program(coarse)
     return fights(program, program.pack(vertical_hop(coarse)), _parameters(problem))
 
 
 class _Found(NamedTuple):
-    """What the solver came back with."""
+    """Result of one run of the solver."""
 
     state: SolverState
     cost: float

@@ -1,11 +1,11 @@
-"""The optimised torques played on Pinocchio's model: an independent integration of a gait.
+"""Independent integration of a gait: the optimised torques on Pinocchio's model.
 
 The collocation asks for the equations of motion at its nodes only. Here the whole robot, with all
 its joints, follows the same torques through an adaptive integrator; how far it ends up from the
 optimised motion is the error that the mesh made.
 
-The trunk is held by a guide to the sagittal plane, without rotation or free to pitch, so the
-coordinates are x, z, perhaps pitch, and the joints; the guide takes the other rows.
+A planar constraint holds the trunk to the sagittal plane, without rotation or free to pitch, so
+that the coordinates are x, z, perhaps pitch, and the joints; it takes the other rows.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _TOLERANCE = 1e-10
 
 
 class Worst(NamedTuple):
-    """A largest value, and when it is met."""
+    """A largest value, and its time."""
 
     value: float
     time: float
@@ -45,7 +45,7 @@ class Drift(NamedTuple):
 
 
 def guided_rows(robot: Robot, base: Base = "locked") -> IntArray:
-    """Indices of the velocities that the guide leaves free: x, z, perhaps pitch, and the joints.
+    """Indices of the planar rows of the velocity: x, z, perhaps pitch, and the joints.
 
     x and z are those of the trunk, which stay in the sagittal plane.
     """
@@ -63,10 +63,12 @@ def guided_equations(
     feet: Sequence[str] = (),
     base: Base = "locked",
 ) -> tuple[Array, Array]:
-    """Matrix and right-hand side of eq. (5) on the rows that the guide leaves free, (2) in flight.
+    """Matrix and right-hand side of eq. (5) on the planar rows, or of (2) in flight.
 
-    Arguments are those of `forward_dynamics`. The unknowns are the accelerations of the free rows,
-    and the contact forces of the feet.
+        [[M, -J^T], [J, 0]] [a, lam] = [S tau - H v - G, -sigma]
+
+    Arguments are those of `forward_dynamics`. The unknowns are the accelerations of the planar
+    rows, and the contact forces of the feet.
     """
     rows = guided_rows(robot, base)
     mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]  # (14 or 15, ...)
@@ -90,7 +92,7 @@ def forward_dynamics(
     feet: Sequence[str] = (),
     base: Base = "locked",
 ) -> Array:
-    """Acceleration of the guided robot: eq. (5) of the feet that stand, or (2) without any.
+    """Acceleration of the planar robot: eq. (5) for standing feet, or (2) without any.
 
     Args:
         robot: The robot.
@@ -102,7 +104,7 @@ def forward_dynamics(
         base: What the guide leaves the trunk.
 
     Returns:
-        Acceleration, shape (18,), zero where the guide holds the trunk.
+        Acceleration, shape (18,), zero where the constraint holds the trunk.
     """
     rows, a = guided_rows(robot, base), np.zeros(robot.nv)
     kkt, right = guided_equations(robot, q, v, tau, contact=contact, feet=feet, base=base)
@@ -171,7 +173,7 @@ def _rates(y: Array, n: int, nl: int) -> Array:
 
 
 def _configuration(robot: Robot, y: Array) -> Array:
-    """q of the guided robot from x, z, perhaps pitch, and the joints, shape (19,)."""
+    """Configuration from the planar coordinates x, z, perhaps pitch, and the joints, (19,)."""
     nb = len(y) - robot.nu
     pitch = float(y[2]) if nb > 2 else 0.0
     return robot.q_from_base(np.array([y[0], 0.0, y[1]]), y[nb:], pitch=pitch)

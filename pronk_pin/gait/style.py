@@ -1,4 +1,4 @@
-"""The gaits known by name: what a gait problem of each style looks like."""
+"""Gait styles known by name, and the gait problems they stand for."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def known_base(base: str) -> Base:
 
 
 def number_range(name: str, words: Iterable[str]) -> tuple[float, ...]:
-    """Numbers from words, each a number or a range A:B:STEP with both ends, increasing.
+    """Parse texts, each a number or a range A:B:STEP with both ends, into increasing numbers.
 
     Raises:
         InvalidInput: A word is neither.

@@ -73,7 +73,7 @@ class Constraint:
 
 
 class Violation(NamedTuple):
-    """The worst violation of a constraint."""
+    """Worst violation of a constraint, and its place."""
 
     value: float
     """In the constraint's unit; 0 where it is met."""
@@ -107,7 +107,7 @@ class Transcription:
         cost: ca.SX,
         constraints: tuple[Constraint, ...],
     ) -> Transcription:
-        """Put a program together."""
+        """Assemble a program from its blocks."""
         x, g = _stacked_unknowns(unknowns), _stacked_constraints(constraints)
         evaluate = ca.Function("evaluate", [x, parameters], [g])
         return cls(unknowns, parameters, cost, constraints, evaluate)

@@ -91,7 +91,7 @@ class _Chain:
         self._warm: proxqp.dense.QP | None = None
 
     def solve(self, k: int) -> tuple[Array, bool]:
-        """Forces of instant k, and whether they meet the base's equations."""
+        """Solve instant k: its forces, and whether they meet the base's equations."""
         terms = self._terms(k)
         if self._warm is not None:
             self._warm.update(**terms, **_WARM)
@@ -146,6 +146,6 @@ def _new_qp(terms: dict[str, Array]) -> proxqp.dense.QP:
 
 
 def _solved(qp: proxqp.dense.QP) -> bool:
-    """Solve; whether the accuracy is met."""
+    """Solve a QP, and return whether the accuracy is met."""
     qp.solve()
     return bool(qp.results.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED)

@@ -214,7 +214,7 @@ def rotate_leg(robot: Robot, joints: npt.ArrayLike, delta: npt.ArrayLike) -> Arr
 
 
 def _in_range(angles: Array, low: Array, high: Array) -> tuple[Array, BoolArray]:
-    """Angles (..., 3) up to whole turns, as near the middle of their range as can be; whether all
+    """Angles (..., 3) wrapped as near the middle of their range as can be; whether all
     are within it, shape (...)."""
     # The middle counts: the thigh of the A1 goes beyond pi.
     middle = 0.5 * (low + high)

@@ -24,7 +24,7 @@ _STALLED = 1e-12
 
 
 class WholeBodySolution(NamedTuple):
-    """A configuration that puts trunk and feet where they are wanted, or as near as can be."""
+    """Configuration with trunk and feet at their targets, or as near as can be."""
 
     q: Array
     """Configuration, shape (19,), within the joint limits."""
@@ -57,7 +57,7 @@ class _Task(NamedTuple):
         return np.array(pin.log6(robot.data.oMi[1].actInv(self.base)).vector), apart
 
     def cost(self, errors: tuple[Array, Array]) -> float:
-        """What the steps reduce."""
+        """Weighted sum of squared errors that the steps reduce."""
         base, feet = errors
         return float(self.weight * base @ base + np.sum(feet**2))
 
@@ -120,7 +120,7 @@ def inverse_kinematics(
 def _descend(
     robot: Robot, task: _Task, q: Array, tolerance: float, iterations: int
 ) -> WholeBodySolution:
-    """Steps until the targets are reached or come no nearer."""
+    """Iterate until the targets are reached or come no nearer."""
     qp = proxqp.dense.QP(robot.nv, 0, robot.nu)
     qp.settings.eps_abs, qp.settings.eps_rel = _ACCURACY, 0.0
     errors, taken = task.errors(robot, q), 0

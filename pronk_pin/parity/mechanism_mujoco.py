@@ -44,7 +44,7 @@ def read_mujoco(model: mujoco.MjModel, label: str, *, round_off: float = 0.0) ->
 
 
 class _Reader:
-    """Which bodies and joints are the robot's, and where they are at zero joint angles."""
+    """Bodies and joints of the robot, and their places at zero joint angles."""
 
     def __init__(self, model: mujoco.MjModel, label: str) -> None:
         self.model = model
@@ -101,7 +101,7 @@ class _Reader:
             self.bodies.add(0)
 
     def _count(self, roots: list[int]) -> int:
-        """How many hinges, slides and balls bodies under these roots have."""
+        """Number of hinges, slides and balls of the bodies under these roots."""
         body = self.model.jnt_bodyid
         inside = np.isin(self.model.body_rootid[body], roots)
         return int(np.count_nonzero(inside & (self.model.jnt_type != _FREE)))
@@ -205,7 +205,7 @@ def _gravity(model: mujoco.MjModel) -> Array:
 
 
 def _extras(model: mujoco.MjModel, reader: _Reader) -> dict[str, int]:
-    """What else acts on the robot, counted."""
+    """Counts of other elements that act on the robot."""
     dofs = [model.jnt_dofadr[joint] for joint in reader.joints]
     nonlinear = sum(
         int(np.any(getattr(model, name)[rows], axis=1).sum())
