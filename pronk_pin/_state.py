@@ -19,7 +19,7 @@ from .errors import InvalidInput, UnknownName
 from .robot import Robot
 
 _UNIT_TOLERANCE = 1e-6
-"""How far the norm of a base quaternion may be from 1."""
+"""Largest distance of the norm of a base quaternion from 1."""
 
 _FLOAT = np.dtype(np.float64)
 _BASE = struct.Struct("7d").unpack_from
@@ -27,7 +27,7 @@ _BASE = struct.Struct("7d").unpack_from
 
 
 REFUSALS = (TypeError, ValueError, AttributeError)
-"""What Pinocchio and NumPy raise for arguments of the wrong shape or type."""
+"""Errors that Pinocchio and NumPy raise for arguments of the wrong shape or type."""
 
 
 def sound_base(q: npt.ArrayLike) -> bool:

@@ -164,7 +164,7 @@ class Robot:
         return self.parameters.of_joint(name, self.joint_kinds, len(self.spec.joints))
 
     def friction(self, rates: Array) -> Array:
-        """Joint friction at joint velocities (..., 12) [rad/s], shape (..., 12) [N m]."""
+        """Friction `d v + c tanh(v / v_s)` at joint velocities v (..., 12) [rad/s], in [N m]."""
         sliding = np.tanh(rates / SLIDING)
         return np.asarray(self.of_joint("damping") * rates + self.of_joint("coulomb") * sliding)
 

@@ -41,7 +41,7 @@ class Compare:
     workers: int | None = None
     """Processes; by default one for each core."""
     executor: str | None = None
-    """Who simulates instead of these processes: dask://HOST:PORT of a dask scheduler."""
+    """Executor instead of these processes: dask://HOST:PORT of a dask scheduler."""
 
     def run(self) -> None:
         """Do it."""
@@ -137,7 +137,7 @@ class Explain:
     imu_noise: float = 0.0
     """Standard deviation of noise added to the trunk's acceleration [m/s^2]."""
     draws: int = 300
-    """How often strides are drawn anew for the intervals."""
+    """Number of bootstrap draws of the strides for the intervals."""
     seed: int = 0
     """Seed of the draws and the noise."""
 

@@ -1,4 +1,4 @@
-"""An IMU on a trunk that may turn, and the attitude that a robot makes out of it."""
+"""IMUs on trunks that may turn, and the attitude estimated from them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .world import World
 
 
 class TrunkKnown(NamedTuple):
-    """What m robots know of their trunks at one tick."""
+    """Estimated states of the trunks of m robots at one tick."""
 
     pose: Array
     """Position and quaternion xyzw, shape (m, 7); an IMU says nothing of the position: zero."""
     twist: Array
     """Velocity in the trunk's own axes, shape (m, 6); nor of the linear one."""
     specific_force: Array
-    """What the accelerometer says, trunk's axes [m/s^2], shape (m, 3); zero without one."""
+    """Reading of the accelerometer, trunk's axes [m/s^2], shape (m, 3); zero without one."""
 
 
 class InertialUnit:

@@ -32,7 +32,7 @@ DEMANDS: Mapping[str, tuple[float, str]] = {
     "friction cone": (20.0, "raise friction"),
     "impulse cone": (1.0, "raise friction"),
 }
-"""What may give way: the size of it that counts as one, in its unit, and what to try. The demand
+"""Demands that may give way: their typical sizes, in their units, and remedies. The demand
 "average speed" is kept as a distance over the stride [m]."""
 
 _REGULAR = 0.1

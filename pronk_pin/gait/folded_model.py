@@ -84,7 +84,7 @@ class FoldedModel:
         return self.nb + self.nl
 
     def joint_rows(self) -> IntArray:
-        """Which of the robot's joints the folded robot keeps, shape (6,)."""
+        """Indices of the robot's joints that the folded robot keeps, shape (6,)."""
         kept = np.array([self.robot.legs.index(leg) for leg in self.legs], dtype=np.intp)
         return _leg_joints(kept)
 

@@ -15,7 +15,7 @@ from ..errors import InvalidInput
 from ..robot import Robot
 
 Base = Literal["locked", "sagittal"]
-"""How the trunk may move: along x and z only, as in the paper, or pitching too."""
+"""Base mode: the trunk moves along x and z only, as in the paper, or pitches too."""
 
 Pair = Literal["front", "rear"]
 """A pair of legs, left and right: in a gait with mirror symmetry they do the same."""

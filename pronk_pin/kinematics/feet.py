@@ -17,7 +17,7 @@ from ..robot import JOINTS, NB, Robot
 from .legs import Hip, Knee, LegGeometry, leg_angles, leg_geometry, leg_motion
 
 _ROUND_OFF = 1e-9
-"""How far a joint limit [rad] may be exceeded by round-off."""
+"""Round-off [rad] by which a joint limit may be exceeded."""
 
 
 class LegSolution(NamedTuple):

@@ -19,13 +19,13 @@ from ..errors import InvalidInput
 from ..robot import JOINTS, Robot
 
 Knee = Literal["backward", "forward"]
-"""Which way a knee points; backward is a negative calf angle, as on the A1."""
+"""Direction in which a knee points; backward is a negative calf angle, as on the A1."""
 
 Hip = Literal["above", "below"]
 """Whether the hip is above its foot, as in standing and walking, or below it."""
 
 _ROUND_OFF = 1e-9
-"""How far the reach of the links may be exceeded by round-off."""
+"""Relative round-off by which the reach of the links may be exceeded."""
 
 _AXES = {"hip": "RX", "thigh": "RY", "calf": "RY"}
 

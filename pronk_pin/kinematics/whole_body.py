@@ -31,10 +31,10 @@ class WholeBodySolution(NamedTuple):
     reached: bool
     """Whether every target is met to the tolerance."""
     base_error: Array
-    """What is left between the trunk and its target: the translation [m] and rotation [rad] to it,
+    """Remaining error of the trunk's pose: the translation [m] and rotation [rad] to its target,
     in the trunk's frame, shape (6,); zero where the trunk is free."""
     foot_errors: Array
-    """What is left between the feet and their targets, in the world [m], shape (feet, 3)."""
+    """Remaining errors of the feet's positions, in the world [m], shape (feet, 3)."""
     iterations: int
     """Steps that were taken."""
 

@@ -29,7 +29,7 @@ from .mechanism_mujoco import read_mujoco
 from .table import Row, compare_tables, format_table, format_value
 
 Model: TypeAlias = Robot | str | Path | mujoco.MjModel
-"""What can be compared."""
+"""Kinds of models that can be compared."""
 
 ROUND_OFF = 1e-9
 """Relative tolerance for models with all their digits."""

@@ -38,7 +38,7 @@ _FLAGS = (
 )
 
 _PATIENCE = 60.0
-"""How long an answer may take [s]."""
+"""Timeout of an answer [s]."""
 
 
 def find_browser() -> str:
@@ -160,7 +160,7 @@ class Browser:
             time.sleep(0.02)
 
     def screenshot(self) -> bytes:
-        """What is on the screen, as PNG."""
+        """Screenshot, as PNG."""
         # Two frames on, what was true before is drawn and composed.
         self.run("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(f)))")
         return base64.b64decode(self.call("Page.captureScreenshot")["data"])
@@ -210,7 +210,7 @@ class Browser:
         return message
 
     def _gone(self) -> NoBrowser:
-        """What its last words were."""
+        """Last output of the browser."""
         self._log.seek(0)
         words = self._log.read().decode(errors="replace").strip().splitlines()
         return NoBrowser(f"{Path(self._program).name} ended ({' '.join(words[-2:])})")

@@ -132,7 +132,7 @@ def torque_surface(strides: xr.Dataset) -> Figure:
 
 @styled
 def learned_minus_model(learned: xr.Dataset, model: xr.Dataset) -> Figure:
-    """What practice adds to the model: learned minus the model's feedforward torque, by speed.
+    """Learned minus the model's feedforward torque, by speed.
 
     Args:
         learned: The strides of a learning controller.

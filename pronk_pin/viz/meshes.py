@@ -1,4 +1,4 @@
-"""What the robot looks like: its visual geometry, with the meshes light enough for a page.
+"""Visual geometry of the robot, with meshes light enough for a page.
 
 The A1's meshes have 216,000 triangles, most of them for screws. They are thinned out once in a
 process by clustering vertices; a page with two robots then fits into two megabytes.

@@ -151,7 +151,7 @@ def _beside(track: Track) -> tuple[float, float, float] | None:
 
 
 def _windows(strides: xr.Dataset) -> list[str]:
-    """What the page offers to show of the strides."""
+    """Windows of strides that the page offers."""
     count = int(strides["count"].max())
     learned = bool((strides["learning"] == 1).any())
     starts = range(0, max(count - WINDOW, 0) + 1, WINDOW)
@@ -205,7 +205,7 @@ def _pair(robot: Robot, gait: Gait, strides: xr.Dataset, name: str) -> tuple[Tra
 
 @dataclass(frozen=True)
 class _Samples:
-    """Where the samples of some strides lie: on the phase grid, as far as each part lasted.
+    """Times of the samples of some strides: on the phase grid, as far as each part lasted.
 
     Attributes:
         since: Times since the beginning of the part [s], shape (strides, 2, samples).

@@ -1,4 +1,4 @@
-"""What is shown: robots that move, on a ground that passes under them.
+"""Scenes: robots that move, on a ground that passes under them.
 
 A `Scene` is data. The live page, the file, pictures and films all show what its `rows` say.
 
@@ -34,7 +34,7 @@ VIEW_WINDOW = 0.6
 """Time over which the view averages the leader's position [s]: longer than a stride."""
 
 CHANNELS = ("forces", "error", "torque")
-"""What a track may hold beside its configurations."""
+"""Channels that a track may hold beside its configurations."""
 
 
 class Mark(NamedTuple):
@@ -95,7 +95,7 @@ class Track:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Which of `CHANNELS` it holds."""
+        """Names of the `CHANNELS` that the track holds."""
         return tuple(key for key in CHANNELS if getattr(self, key) is not None)
 
     def check(self, robot: Robot) -> None:
@@ -222,12 +222,12 @@ class Scene:
         return t, smooth
 
     def view(self, times: Array) -> Array:
-        """Where the view is at some times [s]: x and y in the world [m], shape (m, 2)."""
+        """Position of the view at some times [s]: x and y in the world [m], shape (m, 2)."""
         t, path = self._path
         return np.stack([np.interp(times, t, path[:, i]) for i in (0, 1)], axis=-1)
 
     def rows(self, times: Array) -> list[dict[str, Array]]:
-        """What each track shows at some times [s], shape (m,).
+        """Values of each track at some times [s], shape (m,).
 
         Returns:
             For each track what `Track.at` gives, and the centres of the feet in the world [m],

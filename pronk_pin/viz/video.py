@@ -22,7 +22,7 @@ from .scene import Scene
 
 @dataclass(frozen=True)
 class Film:
-    """What pictures and films are like.
+    """Size, rate and time of pictures and films.
 
     Attributes:
         width: Width of the picture [pixels].
