@@ -93,7 +93,7 @@ def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = N
     basis = symmetric_basis(*model.shape)
     operator = iteration(law, model, basis)
     size = basis.shape[1]
-    own = iteration(law, model.within_a_stride, basis)
+    within_stride = iteration(law, model.within_a_stride, basis)
     radius = _radius(operator)
     limit = np.full(3, np.nan)
     if radius < 1.0:
@@ -101,8 +101,8 @@ def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = N
     return Analysis(
         quasi_static=quasi_static(law, model),
         radius=radius,
-        stride_radius=_radius(own),
-        largest_gain=_norm(own),
+        stride_radius=_radius(within_stride),
+        largest_gain=_norm(within_stride),
         transient=_transient(operator, size),
         limit=limit,
         with_gain_error={
@@ -161,12 +161,12 @@ def iteration(law: LearningLaw, model: LiftedModel, basis: Array) -> Array:
     """
     size, states = basis.shape[1], len(model.carry)
     none = model.record(*np.zeros((3, basis.shape[0])))
-    rest = law.update(none).reshape(1, -1)
+    learned_from_none = law.update(none).reshape(1, -1)
     columns = []
     for z in np.array_split(np.eye(size + states), max(1, (size + states) // 128)):
         feedforward = (z[:, :size] @ basis.T).reshape(-1, *model.shape)
         record = model.stride(feedforward, none, z[:, size:])
-        learned = law.update(_all_of_robot_0(record)).reshape(len(z), -1) - rest
+        learned = law.update(_all_of_robot_0(record)).reshape(len(z), -1) - learned_from_none
         landed = model.land(feedforward, none, z[:, size:])
         columns.append(np.hstack([learned @ basis, landed]))
     return np.asarray(np.vstack(columns).T, dtype=float)
@@ -198,8 +198,8 @@ def _limit(
 ) -> Array:
     """Errors at the fixed point `z = (1 - T)^-1 c` of the iteration, (samples, joints)."""
     start = np.concatenate([basis.T @ begin.feedforward.reshape(-1), np.zeros(len(model.carry))])
-    first = basis.T @ law.update(begin).reshape(-1)
-    change = np.concatenate([first, np.zeros(len(model.carry))]) - start
+    updated = basis.T @ law.update(begin).reshape(-1)
+    change = np.concatenate([updated, np.zeros(len(model.carry))]) - start
     z = np.linalg.solve(np.eye(len(operator)) - operator, change)  # from the beginning on
     size = basis.shape[1]
     feedforward = begin.feedforward + (basis @ z[:size]).reshape(begin.feedforward.shape)

@@ -77,6 +77,6 @@ def roll_pitch_yaw(rotation: Array) -> Array:
 def pitched(angle: Array) -> Array:
     """Rotation matrices Ry(angle) of pitch angles (...) [rad], shape (..., 3, 3)."""
     cos, sin = np.cos(angle), np.sin(angle)
-    zero, one = np.zeros_like(cos), np.ones_like(cos)
-    rows = [[cos, zero, sin], [zero, one, zero], [-sin, zero, cos]]
+    zero, ones = np.zeros_like(cos), np.ones_like(cos)
+    rows = [[cos, zero, sin], [zero, ones, zero], [-sin, zero, cos]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -127,11 +127,11 @@ class Balance:
             joints: Their joint angles [rad], shape (m, 12).
             reference: The tapes' joint angles [rad], shape (m, 12).
         """
-        rotation, wanted = rotation_matrix(trunk[0][:, 3:7]), self._reference[rows, part, tick]
+        rotation, desired = rotation_matrix(trunk[0][:, 3:7]), self._reference[rows, part, tick]
         if part == 0:
-            added = self._ground(rows, tick, rotation, wanted, trunk[1][:, 3:6], joints)
+            added = self._ground(rows, tick, rotation, desired, trunk[1][:, 3:6], joints)
         else:
-            added = self._air(rows, tick, rotation, wanted, reference)
+            added = self._air(rows, tick, rotation, desired, reference)
         added[~np.isfinite(added)] = 0.0  # a sensor that fails must not reach the motors
         return added
 
@@ -175,19 +175,19 @@ class Balance:
         return np.asarray(np.where(np.arange(ticks) < length[:, None], angle, 0.0).max(axis=1))
 
     def _ground(
-        self, rows: IntArray, tick: int, rotation: Array, wanted: Array, spin: Array, joints: Array
+        self, rows: IntArray, tick: int, rotation: Array, desired: Array, spin: Array, joints: Array
     ) -> Array:
         regulator = self._spec.attitude
         added = np.zeros_like(joints)
         sound = np.isfinite(rotation.sum(axis=(1, 2)) + spin.sum(axis=1) + joints.sum(axis=1))
-        asked = np.flatnonzero(sound & (self._s[rows, 0, tick] < regulator.until))
-        if asked.size == 0:
+        regulated = np.flatnonzero(sound & (self._s[rows, 0, tick] < regulator.until))
+        if regulated.size == 0:
             return added
-        rows, rotation, wanted = rows[asked], rotation[asked], wanted[asked]
-        joints = joints[asked]
-        rate = -np.einsum("nij,nj->ni", rotation, spin[asked])
+        rows, rotation, desired = rows[regulated], rotation[regulated], desired[regulated]
+        joints = joints[regulated]
+        rate = -np.einsum("nij,nj->ni", rotation, spin[regulated])
         rate[:, 1] += self._rate[rows, 0, tick]
-        moment = regulator.moment(attitude_error(rotation, wanted), rate)
+        moment = regulator.moment(attitude_error(rotation, desired), rate)
         points = contact_points(self._geometry, _by_leg(joints), -self._radius * rotation[:, 2])
         arms = np.einsum("nij,nlj->nli", rotation, points.position)
         nominal = self._force[rows, tick]
@@ -195,13 +195,13 @@ class Balance:
         forces = distribute_wrench(arms, wrench, nominal, friction=regulator.friction)
         change = (forces - nominal) @ rotation  # in the trunk's axes
         torque = -np.einsum("nlij,nli->nlj", points.jacobian, change)
-        added[asked] = torque.reshape(joints.shape)
+        added[regulated] = torque.reshape(joints.shape)
         return added
 
     def _air(
-        self, rows: IntArray, tick: int, rotation: Array, wanted: Array, reference: Array
+        self, rows: IntArray, tick: int, rotation: Array, desired: Array, reference: Array
     ) -> Array:
-        turn = np.swapaxes(rotation, -1, -2) @ wanted
+        turn = np.swapaxes(rotation, -1, -2) @ desired
         offset = self._aside[rows, None] * rotation[:, 1, :]  # the world's y in the trunk's axes
         share = self._share[rows, tick]
         moved = placed(self._geometry, _by_leg(reference), turn, offset, share)

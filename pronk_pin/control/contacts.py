@@ -70,8 +70,8 @@ class ContactDetector:
         decided = np.where(load > self.touchdown, 1, np.where(load < self.liftoff, 0, -1))
         ticks = np.where(decided >= 0, np.arange(load.shape[1]), -1)
         latest = np.maximum.accumulate(ticks, axis=1)  # the last tick that decided
-        known = np.take_along_axis(decided, np.maximum(latest, 0), axis=1)
-        return np.asarray((latest >= 0) & (known == 1))
+        state = np.take_along_axis(decided, np.maximum(latest, 0), axis=1)
+        return np.asarray((latest >= 0) & (state == 1))
 
     def stance(self, load: Array, length: IntArray) -> StanceContact:
         """Count contacts and gaps of stances of so many ticks (n,), from their loads (n, ticks)."""

@@ -145,10 +145,10 @@ class Controller:
             learning: Whether they learn from their last stride first, shape (len(rows),); by
                 default none does.
         """
-        sound = self.skipped[rows] == 0
-        learns = sound & learning if learning is not None else np.zeros(len(rows), dtype=bool)
+        usable = self.skipped[rows] == 0
+        learns = usable & learning if learning is not None else np.zeros(len(rows), dtype=bool)
         self._learn(rows[learns])
-        self._retime(rows[sound if self._always_retimes else learns])
+        self._retime(rows[usable if self._always_retimes else learns])
         reference, position = self._stance, self._stance.position[rows]
         return Tape(
             feedforward=self._played(0, rows),
@@ -205,8 +205,8 @@ class Controller:
             reasons.append(self.spec.selection.skipped(last)[rows])
         reasons.append(self._stood[rows])
         self._note_tilt(1, rows, log)
-        far = self._tilt[rows].max(axis=1) > self.spec.selection.tilt
-        reasons.append(np.where(far, SKIPPED.index("tilted"), 0))
+        tilted = self._tilt[rows].max(axis=1) > self.spec.selection.tilt
+        reasons.append(np.where(tilted, SKIPPED.index("tilted"), 0))
         self.skipped[rows] = np.select([reason > 0 for reason in reasons], reasons, default=0)
         return record
 
@@ -276,16 +276,16 @@ class Controller:
 
     def _told(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
         """Prepare the record that a law learns from: delivered torques, look-ahead, symmetry."""
-        told = given(record)
+        learnable = given(record)
         if part == 1:
             # What the end of a flight does shows in the stance that follows it, which is yet to
             # come; it will be like the last one.
             ratio = self._flight.duration[rows] / self._stance.duration[rows]
-            told = told.onward(self._last[0].take(rows), ratio)
+            learnable = learnable.onward(self._last[0].take(rows), ratio)
             if self.balance is not None:
                 share = self.spec.balance.landing
-                told = told.changed(lambda values: share * values)
-        return symmetric(self.robot, told) if self._base == "free" else told
+                learnable = learnable.changed(lambda values: share * values)
+        return symmetric(self.robot, learnable) if self._base == "free" else learnable
 
     def _retime(self, rows: IntArray) -> None:
         """Stretch the references of the next flights of some robots to the measured durations."""

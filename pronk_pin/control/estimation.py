@@ -50,11 +50,11 @@ class SpeedEstimator:
         n, ticks = len(rows), int(log.length.max())
         used = np.arange(ticks) < log.length[:, None]
         pose, twist = _trunk(log, n, ticks)
-        sound = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1)
-        known = np.isfinite(pose.sum(axis=-1) + twist.sum(axis=-1)) & used
-        pose[~known], twist[~known] = _LEVEL, 0.0
-        sound = (sound & known) | ~used
-        if not sound.all():
+        valid = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1)
+        trunk_valid = np.isfinite(pose.sum(axis=-1) + twist.sum(axis=-1)) & used
+        pose[~trunk_valid], twist[~trunk_valid] = _LEVEL, 0.0
+        valid = (valid & trunk_valid) | ~used
+        if not valid.all():
             log = replace(
                 log,
                 joints=np.nan_to_num(log.joints, posinf=0.0, neginf=0.0),
@@ -68,9 +68,9 @@ class SpeedEstimator:
         forward = velocity[:, 0].reshape(n, ticks)
         if log.specific_force is not None:  # gravity does not show in the world's x
             along = rotation_matrix(pose[..., 3:])[..., 0, :]
-            felt = np.einsum("nti,nti->nt", along, log.specific_force[:, :ticks])
-            forward = forward + self._time_constant * felt
-            sound &= np.isfinite(forward) | ~used
+            acceleration = np.einsum("nti,nti->nt", along, log.specific_force[:, :ticks])
+            forward = forward + self._time_constant * acceleration
+            valid &= np.isfinite(forward) | ~used
             forward = np.where(used, forward, 0.0)
         aside = velocity[:, 1].reshape(n, ticks)
         for measured, speeds in ((forward, self.speed), (aside, self.sideways)):
@@ -81,7 +81,7 @@ class SpeedEstimator:
                 timestep=self._timestep,
             )
             latest = filtered[np.arange(n), log.length - 1]
-            speeds[rows] = np.where(sound.all(axis=1), latest, speeds[rows])
+            speeds[rows] = np.where(valid.all(axis=1), latest, speeds[rows])
         return self.speed[rows]
 
 
@@ -154,9 +154,9 @@ class AttitudeEstimator:
             gyro: Angular velocities, trunk's axes [rad/s], shape (m, 3).
             specific_force: Accelerations less gravity, trunk's axes [m/s^2], shape (m, 3).
         """
-        sound = np.isfinite(gyro.sum(axis=1) + specific_force.sum(axis=1))
-        rows = rows[sound]
-        rate, force = gyro[sound] - self._bias[0][rows], specific_force[sound] - self._bias[1][rows]
+        valid = np.isfinite(gyro.sum(axis=1) + specific_force.sum(axis=1))
+        rows = rows[valid]
+        rate, force = gyro[valid] - self._bias[0][rows], specific_force[valid] - self._bias[1][rows]
         upward = rotation_matrix(self.quaternion[rows])[:, 2]  # the vertical in the trunk's axes
         turn = 0.5 * (self.rate[rows] + rate) + self._weight * np.cross(force, upward)
         self.rate[rows] = rate

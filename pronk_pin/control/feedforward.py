@@ -41,7 +41,7 @@ def model_feedforward(
         UnknownName: There is no such base; see `BASES`.
     """
     guide = GUIDES[known_name("base", base, BASES)]
-    found = [
+    solutions = [
         feedforward(
             robot,
             gait,
@@ -52,4 +52,4 @@ def model_feedforward(
         )
         for gait in gaits
     ]
-    return np.stack([[one.stance, one.flight] for one in found])
+    return np.stack([[solution.stance, solution.flight] for solution in solutions])

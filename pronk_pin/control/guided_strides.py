@@ -172,7 +172,7 @@ class GuidedStrides:
             rate = rate - state[FREE + 2 : SPEED]
             torques.append(self.kp * error + self.kd * rate)
             following, stands = self.step(state, torques[-1], stands)
-            above, below = (self.height(self.q(one)) for one in (state, following))
+            above, below = (self.height(self.q(at)) for at in (state, following))
             if self.flight_phase[tick] > _HALF and below <= 0.0:
                 part = above / (above - below)
                 landing = state + part * (following - state)

@@ -74,8 +74,10 @@ def given(record: StrideRecord) -> StrideRecord:
     feedback = record.feedback
     cut = np.clip(record.missing, -np.abs(feedback), np.abs(feedback))
     cut = np.where(cut * feedback < 0.0, cut, 0.0)
-    rest = record.missing - cut
-    return replace(record, feedback=feedback + cut, feedforward=record.feedforward + rest)
+    feedforward_cut = record.missing - cut
+    return replace(
+        record, feedback=feedback + cut, feedforward=record.feedforward + feedforward_cut
+    )
 
 
 def anti_windup(learned: Array, record: StrideRecord, tau_max: Array) -> Array:

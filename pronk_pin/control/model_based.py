@@ -45,11 +45,11 @@ class Answers(NamedTuple):
         curves = np.eye(samples) if splines is None else spline_basis(samples, splines)
         basis = np.asarray(np.kron(curves, np.eye(joints)), dtype=float)
         state = np.zeros((len(model.carry), basis.shape[1]))
-        own, pushed, answers = model.angle @ basis, model.push @ basis, []
+        direct, touchdown, responses = model.angle @ basis, model.push @ basis, []
         for _ in range(horizon):
-            answers.append(own + model.angle_start @ state)
-            state = model.carry @ state + pushed
-        return cls(basis, np.asarray(np.stack(answers), dtype=float))
+            responses.append(direct + model.angle_start @ state)
+            state = model.carry @ state + touchdown
+        return cls(basis, np.asarray(np.stack(responses), dtype=float))
 
 
 @lru_cache
@@ -84,10 +84,10 @@ class ModelBasedILC:
 
     def along(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
         """Bind the law to models of the robots, in the order of `StrideRecord.robot`."""
-        answers = tuple(
+        responses = tuple(
             Answers.of(model, splines=self.splines, horizon=self.horizon) for model in models
         )
-        return replace(self, answers=answers)
+        return replace(self, answers=responses)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -141,7 +141,8 @@ class PlantInversionILC(ModelBasedILC):
         """See `ModelBasedILC.along`."""
         bound = super().along(models)
         inverses = tuple(
-            np.linalg.pinv(one.strides.mean(axis=0), rcond=self.cutoff) for one in bound.answers
+            np.linalg.pinv(response.strides.mean(axis=0), rcond=self.cutoff)
+            for response in bound.answers
         )
         return replace(self, answers=bound.answers, inverses=inverses)
 
@@ -181,10 +182,10 @@ class NormOptimalILC(ModelBasedILC):
     def along(self, models: Sequence[LiftedModel]) -> NormOptimalILC:
         """See `ModelBasedILC.along`."""
         bound, steps = super().along(models), []
-        for one in bound.answers:
-            square = np.mean([answer.T @ answer for answer in one.strides], axis=0)
+        for response in bound.answers:
+            square = np.mean([G.T @ G for G in response.strides], axis=0)
             inverse = np.linalg.inv(square + (self.change + self.effort) * np.eye(len(square)))
-            steps.append((inverse @ one.strides.mean(axis=0).T, self.effort * inverse))
+            steps.append((inverse @ response.strides.mean(axis=0).T, self.effort * inverse))
         return replace(self, answers=bound.answers, steps=tuple(steps))
 
     def _next(self, robot: int, errors: Array, memory: Array) -> Array:

@@ -207,10 +207,10 @@ def resample(values: Array, position: Array) -> Array:
     weight = (position - lower).reshape(-1, 1)
     # Whole samples are gathered from one long list of them: much faster than two indices.
     samples, begin = values.reshape(n * m, -1), m * np.arange(n)[:, None]
-    found = samples.take((begin + lower).ravel(), axis=0)
+    values_below = samples.take((begin + lower).ravel(), axis=0)
     change = samples.take((begin + np.minimum(lower + 1, m - 1)).ravel(), axis=0)
     with np.errstate(invalid="ignore"):  # what is not finite gives what is not finite
-        change -= found
+        change -= values_below
         change *= weight
-        change += found
+        change += values_below
     return np.asarray(change.reshape(*position.shape, *values.shape[2:]))

@@ -38,9 +38,9 @@ def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, numb
     gains, record = strides.settings.gains, begin
     strides.tell(begin.feedforward[0])
     stance, _, landing = strides.orbit()
-    missed, missed_rate = (
-        known[0] - own
-        for known, own in zip(
+    error_offset, rate_offset = (
+        recorded[0] - simulated
+        for recorded, simulated in zip(
             (begin.error, begin.error_rate), strides.stance_errors(stance), strict=True
         )
     )
@@ -55,7 +55,7 @@ def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, numb
         except InvalidInput:  # it does not come down
             break
         error, rate = strides.stance_errors(stance)
-        errors[k], rate = error + missed, rate + missed_rate
+        errors[k], rate = error + error_offset, rate + rate_offset
         feedback = gains.proportional * errors[k] + gains.derivative * rate
         record = StrideRecord.of(errors[k][None], rate[None], feedback[None], feedforward)
     return errors

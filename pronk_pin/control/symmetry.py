@@ -36,6 +36,6 @@ def symmetric(robot: Robot, record: StrideRecord) -> StrideRecord:
 def _partners(robot: Robot) -> tuple[int, ...]:
     """For each leg the index of the one on the other side of the trunk."""
     hips = leg_geometry(robot).hip
-    other = hips * np.array([1.0, -1.0, 1.0])
-    distance = np.linalg.norm(hips[None] - other[:, None], axis=-1)
+    mirrored_hips = hips * np.array([1.0, -1.0, 1.0])
+    distance = np.linalg.norm(hips[None] - mirrored_hips[:, None], axis=-1)
     return tuple(int(k) for k in np.argmin(distance, axis=1))

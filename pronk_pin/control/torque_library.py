@@ -110,17 +110,17 @@ class TorqueLibrary:
 
     def _places(self, speeds: Array) -> Array:
         """Fractional indices of speeds into those of the library, shape (m,)."""
-        wanted, lowest, highest = np.atleast_1d(speeds), self.speeds[0], self.speeds[-1]
-        for speed in wanted:
+        queries, lowest, highest = np.atleast_1d(speeds), self.speeds[0], self.speeds[-1]
+        for speed in queries:
             if not lowest - 1e-9 <= speed <= highest + 1e-9:
                 raise SpeedOutOfRange(float(speed), float(lowest), float(highest))
-        return np.interp(wanted, self.speeds, np.arange(len(self.speeds)))
+        return np.interp(queries, self.speeds, np.arange(len(self.speeds)))
 
     def without(self, speed: float) -> TorqueLibrary:
         """The library without the learned speed nearest to the given one."""
-        rest = np.arange(len(self.speeds)) != int(np.argmin(np.abs(self.speeds - speed)))
+        kept = np.arange(len(self.speeds)) != int(np.argmin(np.abs(self.speeds - speed)))
         return TorqueLibrary(
-            self.speeds[rest], self.torque[rest], self.spread[rest], self.flight[rest]
+            self.speeds[kept], self.torque[kept], self.spread[kept], self.flight[kept]
         )
 
     def left_out(self, speeds: Array) -> tuple[Skill, BoolArray]:
@@ -132,10 +132,10 @@ class TorqueLibrary:
         Raises:
             SpeedOutOfRange: A speed is the first or the last, or the library does not cover it.
         """
-        rest = [(self.without(speed), np.array([speed])) for speed in speeds]
-        skills = [library.skill(speed) for library, speed in rest]
+        reduced = [(self.without(speed), np.array([speed])) for speed in speeds]
+        skills = [library.skill(speed) for library, speed in reduced]
         torque, flight = (np.concatenate(parts) for parts in zip(*skills, strict=True))
-        reusable = [library.reusable(speed) for library, speed in rest]
+        reusable = [library.reusable(speed) for library, speed in reduced]
         return Skill(torque, flight), np.concatenate(reusable)
 
     def save(self, path: Path | str) -> None:

@@ -146,8 +146,8 @@ def _implicit(
     right = np.hstack([-r_q, -r_v, motors])  # (18, 48)
     free = np.linalg.solve(pin.crba(robot.model, robot.data, q), right)
     jacobian = jacobian_at(robot, q, legs, radius)
-    wanted = np.hstack([-c_q, -c_v, np.zeros((len(lam), robot.nu))]) - jacobian @ free
-    response = contact_response(robot, q, jacobian, wanted)
+    target = np.hstack([-c_q, -c_v, np.zeros((len(lam), robot.nu))]) - jacobian @ free
+    response = contact_response(robot, q, jacobian, target)
     parts = [nv, 2 * nv]
     a_q, a_v, a_tau = np.hsplit(free + response.motion, parts)
     lam_q, lam_v, lam_tau = np.hsplit(response.lam, parts)

@@ -115,10 +115,10 @@ def stance_dynamics(
     if simple:
         singular = point_stance(robot, legs).solve_all(*states, out=(a, lam))
     for row in np.flatnonzero(singular):
-        one = stance_accelerations(
+        solution = stance_accelerations(
             robot, (states[0][row], states[1][row], states[2][row]), legs, radius, gains
         )
-        a[row], lam[row], singular[row] = one
+        a[row], lam[row], singular[row] = solution
     return StanceDynamics(
         a.reshape(v.shape), lam.reshape(*batch, 3 * len(legs)), singular.reshape(batch)
     )
@@ -189,6 +189,6 @@ def impact(
     q, v = as_state(robot, q, v)
     as_one("q", q)
     jacobian = jacobian_at(robot, q, legs, radius)
-    wanted = -(1.0 + restitution) * (jacobian @ v)
-    impulse, change, singular = contact_response(robot, q, jacobian, wanted)
+    target = -(1.0 + restitution) * (jacobian @ v)
+    impulse, change, singular = contact_response(robot, q, jacobian, target)
     return Impact(v + change, impulse, singular)

@@ -149,10 +149,10 @@ class PointStance:
         """Compute accelerations of an unchecked state, or None where anything looks odd."""
         try:
             if sound_base(q) and v.ndim == 1:
-                one = self.solve(q, v, tau)
+                solution = self.solve(q, v, tau)
                 # NaN in any joint, velocity or torque shows in the base's acceleration.
-                if not one.singular and isfinite(one.a.item(0)):
-                    return one
+                if not solution.singular and isfinite(solution.a.item(0)):
+                    return solution
         except REFUSALS:
             pass
         return None
@@ -235,17 +235,17 @@ def stance_accelerations(
     if gains.kp:
         target[2::3] -= gains.kp * (foot_positions(robot, q)[list(legs), 2] - robot.foot_radius)
     free = pin.aba(robot.model, robot.data, q, v, np.concatenate([np.zeros(NB), tau]))
-    wanted = target - bias_at(robot, q, v, legs, radius) - jacobian @ free
-    lam, motion, singular = contact_response(robot, q, jacobian, wanted)
+    residual = target - bias_at(robot, q, v, legs, radius) - jacobian @ free
+    lam, motion, singular = contact_response(robot, q, jacobian, residual)
     return StanceDynamics(free + motion, lam, singular)
 
 
-def contact_response(robot: Robot, q: Array, jacobian: Array, wanted: Array) -> Response:
+def contact_response(robot: Robot, q: Array, jacobian: Array, target: Array) -> Response:
     """Solve `J M^-1 J^T lam = wanted` for forces that change the contacts' acceleration.
 
     Or for impulses that change their velocity.
 
-    `wanted` and the response have shape (3 feet,), or (3 feet, n) for n of them at once.
+    `target` and the response have shape (3 feet,), or (3 feet, n) for n of them at once.
 
     Directions in which the contacts cannot move, or push against each other, get the damped
     least-squares solution; all others the exact one.
@@ -257,7 +257,7 @@ def contact_response(robot: Robot, q: Array, jacobian: Array, wanted: Array) -> 
         factor = scipy.linalg.cholesky(delassus, lower=True, check_finite=False)
         pivots = factor.diagonal()
         if pivots.min(initial=np.inf) ** 2 > _SUSPECT * pivots.max(initial=0.0) ** 2:
-            lam = scipy.linalg.cho_solve((factor, True), wanted, check_finite=False)
+            lam = scipy.linalg.cho_solve((factor, True), target, check_finite=False)
             return Response(lam, spread @ lam, _REGULAR)
     except np.linalg.LinAlgError:
         pass
@@ -269,5 +269,5 @@ def contact_response(robot: Robot, q: Array, jacobian: Array, wanted: Array) -> 
         values / (values**2 + (_DAMPING * largest) ** 2 + np.finfo(float).tiny),
         1.0 / np.where(weak, 1.0, values),
     )
-    lam = (vectors * gains) @ (vectors.T @ wanted)
+    lam = (vectors * gains) @ (vectors.T @ target)
     return Response(lam, spread @ lam, np.bool_(weak.any()))

@@ -76,7 +76,7 @@ def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
 
     The errors are those at the nodes of the mesh, midpoints included.
     """
-    robot, found = solution.problem.robot, {}
+    robot, losses_by_phase = solution.problem.robot, {}
     for phase, motion in _phases(solution):
         losses, feet = [], _feet(robot, motion)
         s = motion.t / motion.t[-1]
@@ -86,8 +86,8 @@ def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
             joints = float(np.max(np.abs(q - motion.q)[:, NB + 1 :]))
             height = foot_positions(robot, q)[..., 2] - feet[..., 2]
             losses.append(BezierLoss(order, joints, float(np.max(np.abs(height)))))
-        found[phase.name] = tuple(losses)
-    return found
+        losses_by_phase[phase.name] = tuple(losses)
+    return losses_by_phase
 
 
 def _phases(solution: GaitSolution) -> Iterator[tuple[ContactPhase, Motion]]:
@@ -105,12 +105,12 @@ def _stances(solution: GaitSolution) -> Iterator[tuple[str, Motion, list[int]]]:
 
 def _worst(name: str, by_phase: Mapping[str, tuple[Motion, Array]]) -> Check:
     """The worst of values (nodes, ...) over the phases, with its place."""
-    found = []
+    candidates = []
     for phase, (motion, values) in by_phase.items():
         by_node = np.abs(values).reshape(len(motion.t), -1).max(axis=1)
         k = int(np.argmax(by_node))
-        found.append((float(by_node[k]), _place(phase, motion.t[k])))
-    value, where = max(found)
+        candidates.append((float(by_node[k]), _place(phase, motion.t[k])))
+    value, where = max(candidates)
     return Check.of(name, value, where)
 
 
@@ -193,9 +193,9 @@ def _drifts(solution: GaitSolution) -> tuple[_PhaseDrift, _PhaseDrift]:
     }
 
     def worst(standing: bool) -> _PhaseDrift:
-        mine = {phase.name: d for phase, d in drifts.items() if bool(phase.stands) == standing}
-        joints = max((d.joints.value, _place(name, d.joints.time)) for name, d in mine.items())
-        feet = max((d.feet.value, _place(name, d.feet.time)) for name, d in mine.items())
+        group = {phase.name: d for phase, d in drifts.items() if bool(phase.stands) == standing}
+        joints = max((d.joints.value, _place(name, d.joints.time)) for name, d in group.items())
+        feet = max((d.feet.value, _place(name, d.feet.time)) for name, d in group.items())
         return _PhaseDrift(*joints, *feet)
 
     return worst(True), worst(False)
@@ -213,14 +213,14 @@ def _order(solution: GaitSolution, fine: float) -> Check:
         if ratio == 1.0:
             break
         try:
-            found = optimize_gait(
+            coarse_solution = optimize_gait(
                 solution.problem.remeshed(coarse),
                 initial=resampled(solution, coarse),
                 diagnose=False,
             )
         except GaitNotFound:
             continue
-        order = float(np.log(_drifts(found)[0].joints / fine) / np.log(ratio))
+        order = float(np.log(_drifts(coarse_solution)[0].joints / fine) / np.log(ratio))
         return Check.of(name, order, f"stance drift, from {coarse} intervals to {intervals}")
     return Check.of(name, 0.0, "no gait on a coarser mesh to compare with")
 

@@ -73,17 +73,17 @@ def fit(
         flat_rates = rates.reshape(len(s), -1)
         basis, target = np.vstack([basis, slope]), np.vstack([target, flat_rates])
     coefficients = np.zeros((order + 1, flat.shape[1]))
-    known: list[int] = []
+    fixed: list[int] = []
     if pinned >= 1:
         coefficients[0], coefficients[-1] = flat[0], flat[-1]
-        known += [0, order]
+        fixed += [0, order]
     if pinned >= 2:
         if rates is None:
             raise ValueError("pinned=2 needs the rates")
         coefficients[1] = coefficients[0] + flat_rates[0] / order
         coefficients[-2] = coefficients[-1] - flat_rates[-1] / order
-        known += [1, order - 1]
-    free = [i for i in range(order + 1) if i not in known]
+        fixed += [1, order - 1]
+    free = [i for i in range(order + 1) if i not in fixed]
     remainder = target - basis @ coefficients
     coefficients[free] = np.linalg.lstsq(basis[:, free], remainder, rcond=None)[0]
     return np.asarray(coefficients.T.reshape(*shape, order + 1))

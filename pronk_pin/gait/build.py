@@ -132,20 +132,20 @@ def _folder(folder: Path | str | None) -> Iterator[Path]:
         yield Path(temporary)
 
 
-def _home(apexes: Sequence[float] | Array, wanted: float) -> float:
+def _home(apexes: Sequence[float] | Array, desired: float) -> float:
     """The apex at which a build begins."""
-    return float(min(apexes, key=lambda apex: (abs(apex - wanted), apex)))
+    return float(min(apexes, key=lambda apex: (abs(apex - desired), apex)))
 
 
 def _outward(
-    speeds: Sequence[float] | Array, apexes: Sequence[float] | Array, wanted: float
+    speeds: Sequence[float] | Array, apexes: Sequence[float] | Array, desired: float
 ) -> dict[Key, Key | None]:
     """Order of continuation: each gait with the neighbour that it starts from, or None.
 
     Along the speeds at the home apex, then along the heights; neighbours come first.
     """
     rows = sorted({float(speed) + 0.0 for speed in speeds}, key=lambda v: (abs(v), v))
-    home = _home(apexes, wanted)
+    home = _home(apexes, desired)
     columns = sorted({float(apex) for apex in apexes}, key=lambda h: (abs(h - home), h))
     parents: dict[Key, Key | None] = {}
     for apex in columns:
@@ -270,7 +270,7 @@ def _work(task: _Task, start: Path | None) -> None:
     """Solve and audit one gait, and write its file."""
     began = time.perf_counter()
     solution = _solve(task.problem, None if start is None else _read(_Task(task.problem, start)))
-    found = audit(solution)
+    audit_result = audit(solution)
     metadata = {
         "problem": task.problem.options(),
         "cost": [solution.cost],
@@ -283,7 +283,7 @@ def _work(task: _Task, start: Path | None) -> None:
         },
     }
     state = solution.state
-    arrays = to_arrays(GaitLibrary((solution.gait,), metadata, (found,)))
+    arrays = to_arrays(GaitLibrary((solution.gait,), metadata, (audit_result,)))
     arrays |= {"x": state.x, "lam_x": state.lam_x, "lam_g": state.lam_g}
     arrays["fingerprint"] = np.array(task.problem.fingerprint())
     write_arrays(task.path, arrays)

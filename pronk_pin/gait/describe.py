@@ -23,15 +23,15 @@ def describe_library(library: GaitLibrary) -> str:
         "    m/s      m       s     (worst)       N, N m           rad         m           rad"
         "              rad  of lim.   of lim.   of lim.",
     ]
-    for gait, found in zip(library.gaits, library.audit, strict=True):
+    for gait, result in zip(library.gaits, library.audit, strict=True):
         lines.append(
             f"{gait.speed:>+7.2f}{gait.apex:>7.3f}{gait.duration:>8.3f}"
-            f"{found.worst_violation.value:>11.1e}{found['18-DoF residual'].value:>13.1e}"
-            f"{found['stance drift'].value:>14.1e}{found['stance foot drift'].value:>10.1e}"
-            f"{found['flight drift'].value:>14.1e}{found['convergence order'].value:>7.1f}"
-            f"{found['bezier position'].value:>10.1e}{found['torque use'].value:>8.0%}"
-            f"{found['velocity use'].value:>10.0%}{found['friction use'].value:>10.0%}"
-            + ("" if found.passed else "  FAILED: " + ", ".join(c.name for c in found.failures))
+            f"{result.worst_violation.value:>11.1e}{result['18-DoF residual'].value:>13.1e}"
+            f"{result['stance drift'].value:>14.1e}{result['stance foot drift'].value:>10.1e}"
+            f"{result['flight drift'].value:>14.1e}{result['convergence order'].value:>7.1f}"
+            f"{result['bezier position'].value:>10.1e}{result['torque use'].value:>8.0%}"
+            f"{result['velocity use'].value:>10.0%}{result['friction use'].value:>10.0%}"
+            + ("" if result.passed else "  FAILED: " + ", ".join(c.name for c in result.failures))
         )
     times = library.metadata.get("solve_time", [])
     if times:

@@ -108,15 +108,15 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] |
             p=p,
         )
         if solver.stats()["success"]:
-            gives = np.array(result["x"]).ravel()[-len(names) :]
-            found = [i for i in np.argsort(-gives) if gives[i] > NOTABLE]
-            return {names[i]: float(gives[i] * DEMANDS[names[i]][0]) for i in found}
+            slacks = np.array(result["x"]).ravel()[-len(names) :]
+            conflicting = [i for i in np.argsort(-slacks) if slacks[i] > NOTABLE]
+            return {names[i]: float(slacks[i] * DEMANDS[names[i]][0]) for i in conflicting}
     return None
 
 
-def remedies(found: Mapping[str, float] | None) -> list[str]:
+def remedies(conflicts: Mapping[str, float] | None) -> list[str]:
     """Remedies for conflicting demands, each once."""
-    return list(dict.fromkeys(DEMANDS[name][1] for name in found or ()))
+    return list(dict.fromkeys(DEMANDS[name][1] for name in conflicts or ()))
 
 
 def _elastic(constraint: Constraint, room: ca.SX) -> list[Constraint]:

@@ -288,9 +288,9 @@ def _check_model(path: Path, library: GaitLibrary, robot: Robot | None) -> None:
 def _check_audit(path: Path, library: GaitLibrary) -> None:
     if not library.audit:
         raise FileProblem(path, "gaits without an audit", _REBUILD)
-    for gait, found in zip(library.gaits, library.audit, strict=True):
-        if not found.passed:
-            failed = ", ".join(check.name for check in found.failures)
+    for gait, result in zip(library.gaits, library.audit, strict=True):
+        if not result.passed:
+            failed = ", ".join(check.name for check in result.failures)
             raise FileProblem(
                 path,
                 f"the gait at {gait.speed:g} m/s, apex {gait.apex:g} m, fails its audit ({failed})",

@@ -143,17 +143,17 @@ def optimize_gait(
     """
     if isinstance(initial, GaitSolution):
         _check_alike(initial.problem, problem)
-    found = _solve(problem, initial)
+    run = _solve(problem, initial)
     program, p = _program(problem), _parameters(problem)
-    violations = program.violations(found.state.x, p)
+    violations = program.violations(run.state.x, p)
     worst = {name: violation.value for name, violation in violations.items()}
-    if not found.success or max(worst.values()) > TOLERANCE:
+    if not run.success or max(worst.values()) > TOLERANCE:
         gives = _fights(problem) if diagnose else None
-        raise GaitNotFound(problem.speed, found.status, worst, gives, remedies(gives))
-    return _solution(problem, found.state, found)
+        raise GaitNotFound(problem.speed, run.status, worst, gives, remedies(gives))
+    return _solution(problem, run.state, run)
 
 
-def _solution(problem: GaitProblem, state: SolverState, found: _Found) -> GaitSolution:
+def _solution(problem: GaitProblem, state: SolverState, run: _Found) -> GaitSolution:
     program, model = _program(problem), fold_problem(problem)
     values = program.unpack(state.x)
     motions = {phase.name: unfolded(model, values, phase) for phase in problem.sequence}
@@ -168,10 +168,10 @@ def _solution(problem: GaitProblem, state: SolverState, found: _Found) -> GaitSo
         gait=Gait(problem.robot.name, problem.speed, problem.apex, tuple(phases)),
         motions=motions,
         impulses=impulses,
-        cost=found.cost,
+        cost=run.cost,
         violations=program.violations(state.x, _parameters(problem)),
-        iterations=found.iterations,
-        solve_time=found.solve_time,
+        iterations=run.iterations,
+        solve_time=run.solve_time,
         state=state,
     )
 

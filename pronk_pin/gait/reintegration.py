@@ -148,10 +148,10 @@ def drift(
             rate, (times[0], times[2]), state, method="DOP853", rtol=_TOLERANCE, atol=_TOLERANCE
         )
         state = np.asarray(result.y[:, -1])
-        reached, wanted = state[:n], position[k + 2]
-        joints = max(joints, Worst(float(np.max(np.abs(reached - wanted)[2:])), times[2]))
+        reached, target = state[:n], position[k + 2]
+        joints = max(joints, Worst(float(np.max(np.abs(reached - target)[2:])), times[2]))
         apart = foot_positions(robot, _configuration(robot, reached)) - foot_positions(
-            robot, _configuration(robot, wanted)
+            robot, _configuration(robot, target)
         )
         moved = max(moved, Worst(float(np.max(np.linalg.norm(apart, axis=-1))), times[2]))
     return Drift(joints, moved)

@@ -83,13 +83,13 @@ def gait_problem(
     """
     style = load_style(gait)
     base = style.base if base is None else base
-    given: dict[str, Any] = {
+    defaults: dict[str, Any] = {
         "apex": style.apex,
         "base": base,
         "sequence": style.pitching if base == "sagittal" else style.sequence,
         "stride": style.stride,
     }
-    return GaitProblem(robot, speed, **(given | changes))
+    return GaitProblem(robot, speed, **(defaults | changes))
 
 
 def known_base(base: str) -> Base:

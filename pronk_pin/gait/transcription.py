@@ -167,11 +167,11 @@ class Transcription:
 
     def violations(self, x: Array, p: Array) -> dict[str, Violation]:
         """The worst violation of each named constraint, bounds included."""
-        found: dict[str, Violation] = {}
+        worst_of: dict[str, Violation] = {}
 
         def note(name: str, excess: float, where: str) -> None:
-            if name not in found or excess > found[name].value:
-                found[name] = Violation(excess, where)
+            if name not in worst_of or excess > worst_of[name].value:
+                worst_of[name] = Violation(excess, where)
 
         g, start = np.array(self.evaluate(x, p)).ravel(), 0
         for constraint in self.constraints:
@@ -188,7 +188,7 @@ class Transcription:
                     where = f"{unknown.where}, node {nodes[row]}"
                     note(limit, float(excess[nodes[row], row]), where)
         return {
-            name: Violation(max(0.0, worst.value), worst.where) for name, worst in found.items()
+            name: Violation(max(0.0, worst.value), worst.where) for name, worst in worst_of.items()
         }
 
 

@@ -72,10 +72,10 @@ class SaddlePoint(NamedTuple):
     rhs: Array
     """Shape (..., size + 6)."""
 
-    def correction(self, rest: Array, rows: IntArray) -> Array:
+    def correction(self, residual: Array, rows: IntArray) -> Array:
         """Cheapest change of y that removes a residual (m, 6) of the base's equations, at
         some of n instants, shape (m, size)."""
-        return apply(self.inverse[rows, :-NB, -NB:], rest)
+        return apply(self.inverse[rows, :-NB, -NB:], residual)
 
     def solve(self) -> Array:
         """Solve for y; where the base's equations cannot be met, violate them least."""

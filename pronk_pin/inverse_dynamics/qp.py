@@ -66,8 +66,8 @@ def constrained_forces(
     met = np.empty(len(rows), dtype=bool)
     for k in range(len(rows)):
         forces[k], met[k] = chain.solve(k)
-    rest = np.where(met[:, None], chosen.rest(forces), 0.0)
-    return forces + conditions.correction(rest, rows)
+    residual = np.where(met[:, None], chosen.rest(forces), 0.0)
+    return forces + conditions.correction(residual, rows)
 
 
 class _Chain:

@@ -182,7 +182,7 @@ class _Reader:
         """Spheres that collide, at the ends of the limbs."""
         model = self.model
         bearing = {self.link_of(model.body_parentid[model.jnt_bodyid[j]]) for j in self.joints}
-        found: dict[str, list[Foot]] = {}
+        spheres: dict[str, list[Foot]] = {}
         for geom in range(model.ngeom):
             body = int(model.geom_bodyid[geom])
             solid = model.geom_contype[geom] or model.geom_conaffinity[geom]
@@ -195,8 +195,8 @@ class _Reader:
             place = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ model.geom_pos[geom]
             centre = self._in_trunk(place) - self.anchors[link]
             foot = Foot(model.geom(geom).name, centre, float(model.geom_size[geom, 0]))
-            found.setdefault(link, []).append(foot)
-        return {link: tuple(feet) for link, feet in found.items()}
+            spheres.setdefault(link, []).append(foot)
+        return {link: tuple(feet) for link, feet in spheres.items()}
 
 
 def _gravity(model: mujoco.MjModel) -> Array:

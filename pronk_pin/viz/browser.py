@@ -49,8 +49,8 @@ def find_browser() -> str:
     """
     named = os.environ.get(VARIABLE)
     for name in [named] if named else _NAMES:
-        if found := shutil.which(name):
-            return found
+        if program := shutil.which(name):
+            return program
     raise NoBrowser(f"{VARIABLE}={named} is no program" if named else "none is installed")
 
 
@@ -126,10 +126,10 @@ class Browser:
                 if "error" in answer:
                     raise NoBrowser(f"it refuses {method} ({answer['error'].get('message')})")
                 return dict(answer.get("result", {}))
-            told = answer.get("params", {})
-            failed = told.get("entry", {}).get("level") == "error"
+            params_received = answer.get("params", {})
+            failed = params_received.get("entry", {}).get("level") == "error"
             if answer.get("method") == "Runtime.exceptionThrown" or failed:
-                self.errors.append(json.dumps(told))
+                self.errors.append(json.dumps(params_received))
 
     def run(self, expression: str) -> Any:
         """Value of a JavaScript expression in the page; a promise is waited for."""
@@ -190,8 +190,8 @@ class Browser:
             ]
         ):
             time.sleep(0.05)
-        found = self.call("Target.attachToTarget", targetId=pages[0]["targetId"], flatten=True)
-        self._session = found["sessionId"]
+        attached = self.call("Target.attachToTarget", targetId=pages[0]["targetId"], flatten=True)
+        self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
 

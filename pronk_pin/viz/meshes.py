@@ -96,11 +96,11 @@ class Appearance:
         """Centres of the feet in the world [m], shape (n, 4, 3), of configurations (n, 19)."""
         # Scratch memory of its own, for pages are drawn from threads.
         model, data = self.robot.model, self.robot.model.createData()
-        found = np.empty((len(q), len(self.robot.legs), 3))
-        for row, one in enumerate(q):
-            pin.framesForwardKinematics(model, data, one)
-            found[row] = [data.oMf[foot].translation for foot in self.robot.foot_ids]
-        return found
+        centres = np.empty((len(q), len(self.robot.legs), 3))
+        for row, configuration in enumerate(q):
+            pin.framesForwardKinematics(model, data, configuration)
+            centres[row] = [data.oMf[foot].translation for foot in self.robot.foot_ids]
+        return centres
 
 
 @lru_cache(maxsize=4)

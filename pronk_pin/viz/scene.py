@@ -143,11 +143,11 @@ class Track:
         second[turned, 3:7] *= -1.0  # the same rotation, on the near side of the sphere
         q = (1.0 - w) * first + w * second
         q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
-        found = {"q": q}
+        values_at = {"q": q}
         for key in self.channels:
             values = getattr(self, key).reshape(len(self.t), -1)
-            found[key] = (1.0 - w) * values[before] + w * values[after]
-        return found
+            values_at[key] = (1.0 - w) * values[before] + w * values[after]
+        return values_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,9 +233,9 @@ class Scene:
             For each track what `Track.at` gives, and the centres of the feet in the world [m],
             "feet" (m, 12).
         """
-        found = []
+        rows = []
         for track in self.tracks:
             row = track.at(times)
             row["feet"] = self.appearance.feet(row["q"]).reshape(len(times), -1)
-            found.append(row)
-        return found
+            rows.append(row)
+        return rows
