@@ -72,7 +72,7 @@ class TorqueLibrary:
         return cls(speeds, mean, spread, np.nanmedian(flight, axis=1))
 
     def at(self, speeds: Array) -> Array:
-        """Interpolate the torques at speeds (m,) linearly between neighbours [N m], (m, 2, ...).
+        """Interpolate the torques at speeds (m,) between neighbours [N m], shape (m, 2, ...).
 
         Raises:
             SpeedOutOfRange: The library does not cover a speed.
