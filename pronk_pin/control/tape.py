@@ -62,7 +62,7 @@ class Gains:
 class Tape:
     """Commands of n robots for one phase, at each tick: feedforward and joint reference.
 
-    A tape is played as `tau = clip(ff + Kp (q_d - q) + Kd (v_d - v))`, with the feedback of eq. (9).
+    A tape is played as `tau = clip(ff + Kp (q_d - q) + Kd (v_d - v))`, feedback as in eq. (9).
 
     Attributes:
         feedforward: Torques [N m], shape (n, ticks, 12).
