@@ -32,7 +32,7 @@ class Compare:
     """
 
     experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
-    """What to compare."""
+    """The experiment."""
     suite: str = "default"
     """A named experiment, which the other options change: default, mismatch, sampled, control,
     paper."""
@@ -120,9 +120,9 @@ class Explain:
     result: Positional[Path]
     """Results folder."""
     controller: str = "ilc"
-    """Whose strides."""
+    """Controller whose learned torque is explained."""
     scenario: str | None = None
-    """In which scenario; by default the first."""
+    """Scenario of its strides; by default the first."""
     figure: Path | None = None
     """Draw the learned torque by cause into this file: png, svg or pdf."""
     speed: float | None = None

@@ -34,7 +34,7 @@ class Build:
     gait: str = "pronk"
     """Gait style: pronk or bound."""
     base: str | None = None
-    """How the trunk may move: locked (x and z only) or sagittal (pitching too); by default the
+    """Base mode: locked (trunk along x and z only) or sagittal (pitching too); by default the
     gait's own."""
     speeds: tuple[str, ...] = ()
     """Speeds [m/s], each a number or a range A:B:STEP; by default the gait's own."""
@@ -79,7 +79,7 @@ class _OfLibrary:
     gait: str = "pronk"
     """Gait style of the shipped library: pronk or bound."""
     base: str | None = None
-    """How the trunk may move in it; by default the gait's own."""
+    """Base mode of the library, locked or sagittal; by default the gait's own."""
 
     def load(self) -> GaitLibrary:
         """The library, even one that failed its audit."""

@@ -41,7 +41,7 @@ class View:
     gait: str = "pronk"
     """Style of its shipped gaits: pronk or bound."""
     base: str | None = None
-    """How the trunk may move in it, locked or sagittal; by default the gait's own."""
+    """Base mode of the library, locked or sagittal; by default the gait's own."""
     port: int | None = None
     """Port of the page; by default a free one."""
     host: str = "127.0.0.1"

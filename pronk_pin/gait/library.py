@@ -81,7 +81,7 @@ class GaitLibrary:
 
     @property
     def base(self) -> Base:
-        """How the trunk may move."""
+        """Base mode of the gaits: "locked" or "sagittal"."""
         base: Base = self.metadata.get("problem", {}).get("base", "locked")
         return base
 
