@@ -1,4 +1,4 @@
-"""The one place where states and feet that a user passes in are checked; others: `_checks`.
+"""Validation of the states, feet and options that a user passes in.
 
 Leading dimensions are a batch: `(..., 19)` is one configuration or any batch of them.
 """
@@ -20,7 +20,7 @@ from .errors import InvalidInput
 from .robot import Robot
 
 _UNIT_TOLERANCE = 1e-6
-"""How far the norm of a base quaternion may be from 1."""
+"""Largest distance of the norm of a base quaternion from 1."""
 
 _FLOAT = np.dtype(np.float64)
 _BASE = struct.Struct("7d").unpack_from
@@ -28,11 +28,11 @@ _BASE = struct.Struct("7d").unpack_from
 
 
 REFUSALS = (TypeError, ValueError, AttributeError)
-"""What Pinocchio and NumPy raise for arguments of the wrong shape or type."""
+"""Errors that Pinocchio and NumPy raise for arguments of the wrong shape or type."""
 
 
 def sound_base(q: npt.ArrayLike) -> bool:
-    """Whether q is one array with a finite position and a unit quaternion: a quick look.
+    """Whether q is one array with a finite position and a unit quaternion; a quick check.
 
     Pinocchio's algorithms are so fast that checking every number would cost as much as they do.
     This looks at what they would not notice; NaN in joints and velocities shows in the result,
@@ -48,7 +48,7 @@ def sound_base(q: npt.ArrayLike) -> bool:
 
 
 def as_array(name: str, value: npt.ArrayLike, size: int, batch: tuple[int, ...] | None) -> Array:
-    """A finite float64 array of shape (*batch, size); a batch of None allows any.
+    """Convert to a finite float64 array of shape (*batch, size); a batch of None allows any.
 
     Raises:
         InvalidInput: Not numbers, not finite, or of another shape.
@@ -100,7 +100,7 @@ def as_robot(robot: object) -> Robot:
 
 
 def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
-    """A configuration (..., nq) with a unit base quaternion.
+    """Convert to a configuration (..., nq) with a unit base quaternion.
 
     Raises:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
@@ -123,7 +123,7 @@ def as_q(robot: Robot, q: npt.ArrayLike) -> Array:
 
 
 def as_state(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, Array]:
-    """A configuration (..., nq) and a velocity (..., nv) of the same batch shape.
+    """Convert to a configuration (..., nq) and a velocity (..., nv) of the same batch shape.
 
     Raises:
         InvalidInput: As `as_q`, or v does not fit q.
@@ -133,7 +133,7 @@ def as_state(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> tuple[Array, A
 
 
 def as_one(name: str, array: Array) -> Array:
-    """The array itself, if it is no batch.
+    """Return the array itself, if it is no batch.
 
     Raises:
         InvalidInput: It has leading dimensions.

@@ -1,4 +1,4 @@
-"""The robot's URDF in MuJoCo, with the base floating as in Pinocchio's model.
+"""Reading of the robot's URDF into MuJoCo, with a floating base as in Pinocchio's model.
 
 MuJoCo reads a URDF as a robot bolted to the world, cannot read every kind of mesh, and refuses
 inertias that no body can have. What comes out of here has, link by link, the masses and places of
@@ -20,7 +20,7 @@ _WORLD = "pronk_pin_world"
 
 
 def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
-    """The robot as MuJoCo reads its URDF: a floating base, the fixed links fused.
+    """Read the robot's URDF into MuJoCo: a floating base, the fixed links fused.
 
     Compiled once, so that geometries are those of the fused bodies and every inertia stands in
     `inertia` and `iquat`; change it and compile it again. The base is the URDF's root link, as in
@@ -68,7 +68,7 @@ def _drop_shapes(root: ElementTree.Element, *, collisions: bool) -> None:
 
 
 def _float_base(root: ElementTree.Element) -> str:
-    """Let the root link float; its name."""
+    """Let the root link float, and return its name."""
     children = {joint.child for joint in map(_Joint, root.findall("joint"))}
     base = next(
         name for link in root.findall("link") if (name := link.get("name", "")) not in children
@@ -93,7 +93,7 @@ class _Joint:
 
 
 def _merge_impossible_inertias(root: ElementTree.Element) -> None:
-    """Move inertias that MuJoCo refuses into the link that a fixed joint ties theirs to.
+    """Move inertias that MuJoCo refuses into the parent link of their fixed joint.
 
     The base of the Go1 weighs a milligram and has an inertia without three positive principal
     moments. Fused with the trunk, as both engines do with fixed joints, it harms nothing, but
@@ -119,7 +119,7 @@ def _merge_impossible_inertias(root: ElementTree.Element) -> None:
 
 
 def _is_possible(inertia: pin.Inertia) -> bool:
-    """Whether MuJoCo takes it: no mass at all, or moments of inertia that a body can have."""
+    """Whether MuJoCo accepts an inertia: no mass at all, or moments that a body can have."""
     if inertia.mass == 0.0 and not np.any(inertia.inertia):
         return True
     moments = np.linalg.eigvalsh(inertia.inertia)  # ascending
@@ -135,7 +135,7 @@ def body_inertia(body: mujoco.MjsBody) -> pin.Inertia:
 
 
 def set_body_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
-    """Give a body of `mujoco_spec` another inertia, in the body's frame."""
+    """Set the inertia of a body of `mujoco_spec`, in the body's frame."""
     principal, axes = np.linalg.eigh(inertia.inertia)
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0

@@ -1,4 +1,4 @@
-"""What every worker process of ours does first."""
+"""Initialisation of worker processes."""
 
 from __future__ import annotations
 

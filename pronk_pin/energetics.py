@@ -95,7 +95,7 @@ def centroidal_momentum(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Cen
 
 
 def mechanical_power(robot: Robot, v: npt.ArrayLike, tau: npt.ArrayLike) -> Array:
-    """Power that each motor gives to its joint, tau q_dot [W], negative where it brakes; batched.
+    """Mechanical power of each motor, tau q_dot [W], negative where it brakes; batched.
 
     Args:
         robot: The robot.

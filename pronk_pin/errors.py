@@ -1,4 +1,4 @@
-"""Every error that pronk_pin raises on purpose.
+"""Errors that pronk_pin raises on purpose.
 
 Each class carries what is needed to investigate, and its message names the remedy.
 """
@@ -25,7 +25,7 @@ class PronkError(Exception):
 
 
 def _restore(kind: type[PronkError], message: str) -> PronkError:
-    """An error with its message; `__init__` would ask for what the message was made of."""
+    """Restore an error from its message; `__init__` would ask for what the message was made of."""
     error = kind.__new__(kind)
     error.args = (message,)
     return error
@@ -53,7 +53,7 @@ class InvalidInput(PronkError):
 
 @contextmanager
 def reading(kind: str, remedy: str) -> Iterator[None]:
-    """Around the reading of stored text: what it lacks or has otherwise is an `InvalidInput`.
+    """Context of reading stored text, which turns defects of the text into `InvalidInput`.
 
     Args:
         kind: What the text should be, as in "a scenario".
@@ -123,7 +123,7 @@ class FileProblem(PronkError):
 def cannot_write(
     path: Path | str, error: Exception, remedy: str = "choose another place, or make room"
 ) -> FileProblem:
-    """The `FileProblem` of a file or folder that the system, or a library, fails to write."""
+    """Make the `FileProblem` of a file or folder that the system, or a library, fails to write."""
     reason = getattr(error, "strerror", None) or error
     return FileProblem(path, f"cannot be written ({reason})", remedy)
 

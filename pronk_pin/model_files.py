@@ -1,4 +1,4 @@
-"""A robot with its parameters as a file that other programs load: MJCF and URDF."""
+"""Export of a robot with its parameters as MJCF and URDF."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _parameters(inertia: pin.Inertia) -> np.ndarray:
 
 
 def _write(path: Path | str, document: str, notes: Sequence[str]) -> Path:
-    """A document with a comment before it."""
+    """Write a document with a comment before it."""
     path = Path(path)
     # "--" may not stand in a comment.
     comment = "\n".join(line.replace("--", "- -") for line in notes)

@@ -1,4 +1,4 @@
-"""What a model can say of a robot beyond its URDF: rotors, friction, motors, and load.
+"""Model parameters beyond the URDF: rotors, friction, motors and load.
 
 A URDF often leaves out what turns and rubs inside a joint. `Robot.with_parameters` adds it, for
 dynamics, inverse dynamics, impacts and gait optimisation alike:
@@ -34,7 +34,7 @@ _CONSTANT = Interval(0, 100, above=True)
 
 @dataclass(frozen=True)
 class ModelParameters:
-    """What a model says of a robot beyond its URDF; the defaults say nothing.
+    """Parameters of a robot's model beyond its URDF; the defaults change nothing.
 
     Attributes:
         armature: Rotor inertia as the joints of a leg feel it, hip, thigh, calf [kg m^2].
@@ -65,7 +65,7 @@ class ModelParameters:
 
     @property
     def ideal_motors(self) -> bool:
-        """Whether joints get the torques that their motors are asked for: nothing rubs."""
+        """Whether joints get the torques that their motors are commanded, without friction."""
         rubs = any(self.damping) or any(self.coulomb)
         return not rubs and self.torque_constant == 1.0
 
@@ -93,7 +93,7 @@ NOTHING = ModelParameters()
 
 
 def loaded(trunk: pin.Inertia, parameters: ModelParameters) -> pin.Inertia:
-    """The trunk's inertia with its payload and its shifted centre of mass.
+    """Inertia of the trunk with its payload and its shifted centre of mass.
 
     Raises:
         InvalidInput: Nothing would be left of its mass.

@@ -1,4 +1,4 @@
-"""What the robot is: the rigid-body model with its names, feet, limits and standing posture.
+"""The robot: its rigid-body model with names, feet, limits and standing posture.
 
 Everything is read from the URDF; a `RobotSpec` only says which names play which part, see
 `pronk_pin.robot_spec`.
@@ -33,7 +33,7 @@ NB, NL = 6, 12
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A legged robot: Pinocchio's model, and the names and numbers that everything else needs.
+    """A legged robot: Pinocchio's model with its names, limits and parameters.
 
     Attributes:
         spec: The names the robot was built from.
@@ -165,7 +165,7 @@ class Robot:
         return self.parameters.of_joint(name, self.joint_kinds, len(self.spec.joints))
 
     def friction(self, rates: Array) -> Array:
-        """What rubs against joint velocities (..., 12) [rad/s], shape (..., 12) [N m]."""
+        """Friction `d v + c tanh(v / v_s)` at joint velocities v (..., 12) [rad/s], in [N m]."""
         sliding = np.tanh(rates / SLIDING)
         return np.asarray(self.of_joint("damping") * rates + self.of_joint("coulomb") * sliding)
 
@@ -175,7 +175,7 @@ class Robot:
         return np.asarray(self.of_joint("damping") + self.of_joint("coulomb") * slope)
 
     def joint_torques(self, tau: Array, rates: Array) -> Array:
-        """Torques that move the joints, from those that the motors are asked for.
+        """Torques that move the joints, from those that the motors are commanded.
 
         Args:
             tau: Motor torques [N m], shape (..., 12).
@@ -186,7 +186,7 @@ class Robot:
         return np.asarray(self.parameters.torque_constant * tau - self.friction(rates))
 
     def motor_torques(self, torques: Array, rates: Array) -> Array:
-        """Torques to ask the motors for: the inverse of `joint_torques`."""
+        """Motor commands for joint torques: the inverse of `joint_torques`."""
         if self.parameters.ideal_motors:
             return torques
         return np.asarray((torques + self.friction(rates)) / self.parameters.torque_constant)

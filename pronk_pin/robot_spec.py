@@ -1,4 +1,4 @@
-"""Which names of a URDF play which part, where the URDF lies, and whether it has what is named."""
+"""Specification of a robot: its URDF, and the roles of the links and joints in it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DATA_DISTRIBUTION = "example-robot-data"
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """Which names of a URDF play which part in a legged robot.
+    """Roles of the names of a URDF in a legged robot.
 
     Attributes:
         name: Short name, as on the command line.
@@ -124,7 +124,7 @@ ROBOTS = {
 
 
 def check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:
-    """The model has what the specification names, one angle a joint.
+    """Check that the model has what the specification names, one angle a joint.
 
     Raises:
         InvalidInput: It has not.

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from pronk_pin import load_robot
+from pronk_pin import cli, load_robot
 from pronk_pin._urdf import mujoco_spec
 from pronk_pin.cli import main
 from pronk_pin.robot import ROBOTS
@@ -277,3 +277,25 @@ def test_wrong_usage_exits_with_2() -> None:
         with pytest.raises(SystemExit) as exit_:
             main(arguments)
         assert exit_.value.code == 2, arguments
+
+
+def test_an_option_of_the_last_release_still_works_and_names_its_successor(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(cli.RENAMED, "--apex-height", "--apex")
+    shown = []
+    for option in (["--apex_height", "0.34"], ["--apex-height=0.34"], ["--apex", "0.34"]):
+        assert main(["gaits", "show", *option]) == 0
+        output = capsys.readouterr()
+        shown.append(output.out)
+        warned = "is called --apex now" in output.err
+        assert warned == (option[0] != "--apex")
+    assert shown[0] == shown[1] == shown[2]
+
+
+def test_values_that_look_like_an_old_option_stay_as_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(cli.RENAMED, "--tempo", "--speed")
+    arguments = ["view", "tempo", "--figure=--tempo", "--tempos", "1"]
+    assert cli.todays_options(arguments) == arguments

@@ -32,6 +32,10 @@ class _Runs(Protocol):
     def run(self) -> int | None: ...
 
 
+RENAMED: dict[str, str] = {}
+"""Options that the last release knew by another name, with their names of today."""
+
+
 def _commands(arguments: list[str]) -> Any:
     """All commands; the defaults of `compare` are those of the suite that is asked for, or what is
     in the results folder that it is to go on with."""
@@ -63,8 +67,9 @@ Command = (
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; the exit code is 0, 1 for an error of ours or models that differ, 2 for wrong
     usage, 130 on Ctrl-C."""
+    arguments = todays_options(sys.argv[1:] if arguments is None else arguments)
     try:
-        command = _parsed(sys.argv[1:] if arguments is None else arguments)
+        command = _parsed(arguments)
         with warnings.catch_warnings():
             for category in (LeakyFilter, OtherMachine):
                 warnings.simplefilter("once", category)
@@ -113,6 +118,28 @@ def _in_one_line(framed: str) -> str:
             parts[-1] += words
     told = [textwrap.shorten(" ".join(part), _LONGEST_PART, placeholder=" ...") for part in parts]
     return "; ".join(part for part in told if part)
+
+
+def todays_options(arguments: list[str]) -> list[str]:
+    """Replace options of the last release by their names of today, with a warning for each.
+
+    As on the command line, `--name value` and `--name=value` are the same, and so are hyphens and
+    underscores. What is no option stays as it is.
+    """
+    replaced = []
+    for argument in arguments:
+        option, equals, value = argument.partition("=")
+        today = RENAMED.get(option.replace("_", "-"))
+        if today is not None:
+            _show_warning(
+                f"{option} is called {today} now; the old name goes with the next release",
+                FutureWarning,
+                __file__,
+                0,
+            )
+            argument = f"{today}{equals}{value}"
+        replaced.append(argument)
+    return replaced
 
 
 def _show_warning(

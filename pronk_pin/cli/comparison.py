@@ -49,7 +49,7 @@ class Compare:
     """
 
     experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
-    """What to compare."""
+    """The experiment."""
     suite: str = "default"
     """A named experiment, which the other options change: default, mismatch, sampled, control,
     paper."""
@@ -147,9 +147,9 @@ class Explain:
     result: Positional[Path]
     """Results folder."""
     controller: str = "ilc"
-    """Whose strides."""
+    """Controller whose learned torque is explained."""
     scenario: str | None = None
-    """In which scenario; by default the first."""
+    """Scenario of its strides; by default the first."""
     figure: Path | None = None
     """Draw the learned torque by cause into this file: png, svg or pdf."""
     speed: float | None = None
@@ -164,7 +164,7 @@ class Explain:
     imu_noise: float = 0.0
     """Standard deviation of noise added to the trunk's acceleration [m/s^2]."""
     draws: int = 300
-    """How often strides are drawn anew for the intervals."""
+    """Number of bootstrap draws of the strides for the intervals."""
     seed: int = 0
     """Seed of the draws and the noise."""
 

@@ -34,9 +34,9 @@ class Build:
     robot: str = "a1"
     """Robot."""
     gait: str = "pronk"
-    """Which gait: pronk or bound."""
+    """Gait style: pronk or bound."""
     base: str | None = None
-    """How the trunk may move: locked (x and z only) or sagittal (pitching too); by default the
+    """Base mode: locked (trunk along x and z only) or sagittal (pitching too); by default the
     gait's own."""
     speeds: tuple[str, ...] = ()
     """Speeds [m/s], each a number or a range A:B:STEP; by default the gait's own."""
@@ -46,7 +46,7 @@ class Build:
     output: Path = Path("gaits.npz")
     """File to write."""
     folder: Path | None = None
-    """Where each gait is kept; by default beside the output, with '.build' to its name."""
+    """Folder for each solved gait; by default beside the output, with '.build' to its name."""
     workers: int | None = None
     """Processes; by default one for each core."""
 
@@ -74,7 +74,7 @@ class Build:
 
 @dataclass(frozen=True)
 class _OfLibrary:
-    """Which gaits of which library a command looks at."""
+    """Selection of gaits of a library."""
 
     apex: float | None = None
     """Greatest height of the trunk [m]; by default the library's own."""
@@ -83,9 +83,9 @@ class _OfLibrary:
     robot: str = "a1"
     """Robot whose shipped library it is."""
     gait: str = "pronk"
-    """Which of its gaits: pronk or bound."""
+    """Gait style of the shipped library: pronk or bound."""
     base: str | None = None
-    """How the trunk may move in it; by default the gait's own."""
+    """Base mode of the library, locked or sagittal; by default the gait's own."""
 
     def load(self) -> GaitLibrary:
         """The library, even one that failed its audit."""
@@ -116,7 +116,7 @@ class Plot(_OfLibrary):
     speed: Positional[float | None] = None
     """Speed of the side view [m/s]; by default the one nearest to 0.5."""
     folder: Path = Path("figures")
-    """Where to write the figures."""
+    """Folder for the figures."""
     format: str = "png"
     """Format of the figures: png, svg or pdf."""
 

@@ -27,24 +27,24 @@ class View:
     what: Positional[Path | None] = None
     """Results folder or gait library; by default the shipped gaits."""
     speed: float | None = None
-    """Which speed [m/s]; by default the one nearest to 0.5."""
+    """Speed [m/s]; by default the one nearest to 0.5."""
     apex: float | None = None
-    """Which apex of a gait library [m]; by default the library's own."""
+    """Apex of a gait library [m]; by default the library's own."""
     controller: str | None = None
-    """Which controller of a result; by default ilc."""
+    """Controller of a result; by default ilc."""
     scenario: str | None = None
-    """Which scenario of a result; by default the first."""
+    """Scenario of a result; by default the first."""
     beside: str | None = None
-    """What to show beside it: another controller of the result, or 'before learning'."""
+    """Robot to show beside it: another controller of the result, or 'before learning'."""
     stride: int | None = None
     """Show the dozen strides of a result with this one; by default those around the start of
     learning."""
     robot: str = "a1"
     """Robot whose shipped gaits are shown."""
     gait: str = "pronk"
-    """Which of its shipped gaits: pronk or bound."""
+    """Style of its shipped gaits: pronk or bound."""
     base: str | None = None
-    """How the trunk may move in it, locked or sagittal; by default the gait's own."""
+    """Base mode of the library, locked or sagittal; by default the gait's own."""
     port: int | None = None
     """Port of the page; by default a free one."""
     host: str = "127.0.0.1"
@@ -62,7 +62,7 @@ class View:
     mp4: Path | None = None
     """Write a video to this file instead."""
     film: Annotated[Film, arg(name="")] = field(default_factory=Film)
-    """What pictures and films are like."""
+    """Size and rate of pictures and films."""
 
     def run(self) -> None:
         """Do it."""

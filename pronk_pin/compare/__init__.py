@@ -1,4 +1,4 @@
-"""What happens, and what it says: worlds, simulations, experiments, metrics, results."""
+"""Comparison of controllers: worlds, simulations, experiments, metrics, results."""
 
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
 from .explanation import Explanation, describe, explain

@@ -1,8 +1,8 @@
-"""Does the mended model serve? The loop closed at speeds that were never practised, and elsewhere.
+"""Evaluation of the identified model in closed loop, at speeds that were never learned.
 
-What practice found goes back into the model, the model into feedforward and gaits, and these are
-simulated beside what they compete with: the model as it was, practice itself, and the torque
-library of the practised speeds.
+The identified parameters go back into the model, the model into feedforward and gaits, and these
+are simulated beside their competitors: the model as it was, learning itself, and the torque
+library of the learned speeds.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .simulate import Simulation
 from .strides import to_dataset
 
 CONTROLLERS = ("model", "library", "ilc", "identified", "identified+gait")
-"""What is compared."""
+"""Controllers that are compared."""
 STRIDES = 10
 """Strides at the end that count."""
 SCHEDULE = Schedule(practice=6.0, learning=12.0)
@@ -47,7 +47,7 @@ def close_loop(
     rng: np.random.Generator | None = None,
     progress: bool = True,
 ) -> pd.DataFrame:
-    """Simulate the mended model beside its competitors.
+    """Simulate the identified model beside its competitors.
 
     Args:
         explanation: What practice found.
@@ -99,7 +99,7 @@ def close_loop(
 
 
 def format_loop(table: pd.DataFrame) -> str:
-    """The table as text: mean and worst over the speeds, by scenario and controller."""
+    """Format the table: mean and worst over the speeds, by scenario and controller."""
     lines = [
         f"{'':<16}{'':>18}{'calf: peak [rad]':^18}{'thigh: peak [rad]':^18}{'stayed':>10}",
         f"{'scenario':<16}{'controller':>18}{'mean':>9}{'worst':>9}{'mean':>9}{'worst':>9}"
@@ -138,7 +138,7 @@ def _worlds(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> 
 def _begin(
     spec: ControllerSpec, explanation: Explanation, gaits: Sequence[Gait], strides: xr.Dataset
 ) -> Skill:
-    """What a controller begins with."""
+    """Initial feedforward of a controller."""
     if spec.source == "library":
         return torque_library(strides).skill(np.array([gait.speed for gait in gaits]))
     if spec.source == "none":

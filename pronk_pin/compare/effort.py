@@ -1,4 +1,4 @@
-"""What the motion costs: mechanical power and cost of transport, from the last strides' ticks."""
+"""Metrics of effort: mechanical power and cost of transport, from the last strides' ticks."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ TICKS = ("tick_base", "tick_base_rate", "tick_joints", "tick_joint_rates", "tick
 
 
 def effort(strides: xr.Dataset) -> dict[str, tuple[Array, str]]:
-    """Mechanical `power` [W] and `cost_of_transport` [-] of each robot, with their units.
+    """Compute mechanical `power` [W] and `cost_of_transport` [-] of each robot.
 
-    Torques are those that the motors were told, and what a motor brakes is not given back. The
-    weight is the robot's own, without what a scenario adds.
+    `P = 1/T int sum_i max(tau_i q'_i, 0) dt` and `P T / (m g distance)`, with commanded torques;
+    braking gives nothing back. The weight is the robot's own, without what a scenario adds.
 
     Args:
         strides: The strides of one simulation; without ticks there is nothing to say.

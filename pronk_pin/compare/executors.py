@@ -1,4 +1,4 @@
-"""Who does the work: processes on this machine, or the workers of a dask scheduler.
+"""Worker pools: processes on this machine, or the workers of a dask scheduler.
 
 Anything else that is a `concurrent.futures.Executor` can be passed to `run_experiment` itself.
 """
@@ -18,14 +18,14 @@ from .._workers import follow_parent
 from ..errors import ExecutorUnavailable, InvalidInput
 
 _PATIENCE = 10.0
-"""How long a scheduler may take to answer [s]."""
+"""Timeout of a scheduler's answer [s]."""
 
 _steps_done: Synchronized[int] | None = None
 
 
 @dataclass(frozen=True)
 class Crew:
-    """An executor, and what is to be known of it.
+    """A pool of workers: its executor, and how to count, stop and judge its work.
 
     Attributes:
         executor: Whom cells are handed to.
@@ -44,7 +44,7 @@ class Crew:
 
 @contextmanager
 def processes(count: int) -> Iterator[Crew]:
-    """So many processes on this machine."""
+    """Start a pool of processes on this machine."""
     context = multiprocessing.get_context("spawn")
     counter = context.Value("q", 0)
     before = set(multiprocessing.active_children())
@@ -61,14 +61,14 @@ def processes(count: int) -> Iterator[Crew]:
 
 
 def count_steps(steps: int) -> None:
-    """Tell how many more robot-steps are done, if this process is one of `processes`."""
+    """Report finished robot-steps, if this process is one of `processes`."""
     if _steps_done is not None:
         with _steps_done.get_lock():
             _steps_done.value += steps
 
 
 def _begin_worker(counter: Synchronized[int]) -> None:
-    """Set a worker up: it counts its steps, leaves Ctrl-C to the parent, and dies with it."""
+    """Initialise a worker: it counts its steps, leaves Ctrl-C to the parent, and dies with it."""
     global _steps_done
     _steps_done = counter
     follow_parent()
@@ -91,7 +91,7 @@ def known_address(address: str) -> str:
 
 @contextmanager
 def connect(address: str) -> Iterator[Crew]:
-    """The workers of a dask scheduler.
+    """Connect to the workers of a dask scheduler.
 
     Args:
         address: "dask://HOST:PORT".
@@ -125,7 +125,7 @@ def connect(address: str) -> Iterator[Crew]:
 
 
 def _check_workers(client: object, address: str) -> int:
-    """How many workers there are; every one must have our version."""
+    """Count the workers; every one must have our version of the package."""
 
     def installed() -> str | None:  # sent as it stands: a worker may not know this module
         from importlib.metadata import PackageNotFoundError, version

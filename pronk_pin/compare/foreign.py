@@ -1,4 +1,4 @@
-"""A robot from somebody else's MJCF, in place of our URDF: a truth that the model was not made of.
+"""Robots from other MJCF files in place of our URDF: a truth that the model was not made of.
 
 What is taken of the file is the robot: its bodies, inertias, joints with their limits, armature,
 damping and friction, and its feet. The scenario adds to that as it does to the URDF. Not taken are
@@ -68,7 +68,7 @@ def mjcf_spec(robot: Robot, path: Path | str, *, actuators: bool = False) -> muj
 
 
 def mjcf_parity(robot: Robot, path: Path | str) -> Parity:
-    """What an MJCF has otherwise than our robot: its table belongs beside what was measured in it.
+    """Compare an MJCF with our robot; the table belongs beside what was measured in it.
 
     Args and errors as for `mjcf_spec`.
     """
@@ -78,7 +78,7 @@ def mjcf_parity(robot: Robot, path: Path | str) -> Parity:
 
 @dataclass(frozen=True)
 class ForeignRobot:
-    """What a result keeps of the MJCF that it was made with.
+    """Record of the MJCF that a result was made with.
 
     Attributes:
         path: The file.
@@ -96,13 +96,13 @@ class ForeignRobot:
         return cls(str(path), mjcf_sha256(path), mjcf_parity(robot, path))
 
     def to_json(self) -> str:
-        """Everything in it as text; `from_json` reads it."""
+        """The record as JSON; `from_json` reads it."""
         head = {"path": self.path, "sha256": self.sha256}
         return json.dumps({**head, "parity": json.loads(self.parity.to_json())}, indent=1) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> ForeignRobot:
-        """What `to_json` wrote.
+        """Read the record that `to_json` wrote.
 
         Raises:
             InvalidInput: The text is something else.

@@ -1,4 +1,4 @@
-"""Does learning permit smaller feedback gains, as the paper claims (section IV)?"""
+"""Study of smaller feedback gains after learning, as the paper claims (section IV)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .words import number
 SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Feedback gains of the sweep, over the controller's own."""
 NOTHING = Skill()
-"""What a robot begins with that has not practised."""
+"""Initial feedforward of a robot that has not learned."""
 _PRACTICE, _LEARNING, _REPLAY = 4.0, 16.0, 16.0
 
 
@@ -34,7 +34,7 @@ def sweep_gains(
     robot: str = "a1",
     shares: Sequence[float] = SHARES,
 ) -> pd.DataFrame:
-    """Practise once with full gains, then replay what was learned with smaller ones.
+    """Learn once with full gains, then replay the learned feedforward with smaller ones.
 
     Args:
         spec: A controller that learns.
@@ -120,7 +120,7 @@ def simulate(
     schedule: Schedule,
     skill: Skill = NOTHING,
 ) -> Simulation:
-    """A simulation of a controller that has been run, with one seed."""
+    """Run a simulation of a controller, with one seed."""
     simulation = Simulation(
         robot,
         gaits,

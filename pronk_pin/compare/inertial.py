@@ -1,4 +1,4 @@
-"""An IMU on a trunk that may turn."""
+"""IMUs on trunks that may turn, and the attitude estimated from them."""
 
 from __future__ import annotations
 

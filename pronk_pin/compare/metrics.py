@@ -1,4 +1,4 @@
-"""From strides to the summary: one long table, a row a number."""
+"""Metrics: from strides to the summary, one long table with a row a number."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COLUMNS = [*KEYS, "value", "unit"]
 
 
 def steady(strides: xr.Dataset) -> xr.Dataset:
-    """The last `STEADY_STRIDES` finished strides of each speed, renumbered from 0.
+    """Select the last `STEADY_STRIDES` finished strides of each speed, renumbered from 0.
 
     None from before the learning was switched on, or would have been for a controller that does
     not learn, so that all are judged on the same strides: fewer, then, after a short learning. A
@@ -48,7 +48,7 @@ def steady(strides: xr.Dataset) -> xr.Dataset:
 
 
 def _switched(strides: xr.Dataset) -> BoolArray:
-    """Which strides began after the learning was switched on, or would have been, (n, strides)."""
+    """Whether strides began after learning was switched on, or would have been, (n, strides)."""
     if "start" not in strides or "switch" not in strides.attrs:
         return np.asarray(strides["learning"].transpose("speed", "stride") == 1)
     early = float(strides.attrs["timestep"]) / 2
@@ -65,11 +65,14 @@ def by_joint(values: xr.DataArray) -> xr.DataArray:
 
 
 def summarize(strides: xr.Dataset) -> pd.DataFrame:
-    """The summary of one simulation.
+    """Compute the summary of one simulation.
+
+    Over the N steady strides k, with the error e(s) = q_d - q of a joint in stance:
 
     Per joint (mean over the legs and the steady strides):
-        peak_error: Peak of the stance error against the unmodified reference [rad].
-        rms_error: Its root mean square [rad].
+        peak_error: Peak of the stance error against the unmodified reference [rad],
+            `mean_k max_s |e_k(s)|`.
+        rms_error: Its root mean square [rad], `sqrt(mean_k mean_s e_k(s)^2)`.
         contact_error: The peak counted from the contact on, two ticks before it is felt [rad].
         strides_to_converge: See `strides_to_converge`; thigh and calf, and `-` for the later one.
         strides_to_beat_model: See `compare.practice`; added where the model was run too.
@@ -80,7 +83,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
         speed_error, apex_error: Steady mean minus the gait's [m/s], [m].
         apex_deviation: Standard deviation of the apex over the steady strides [m].
         stride_duration: Mean duration of a stride [s].
-        feedback_share: Feedback's share of the torque in stance, as root mean squares.
+        feedback_share: Feedback's share of the torque in stance, `rms(fb) / (rms(fb) + rms(ff))`.
         power, cost_of_transport: Mechanical, see `compare.effort`.
 
     Args:
@@ -145,7 +148,7 @@ def _errors(end: Mapping[str, Array]) -> Iterator[_Row]:
 
 
 def _motion(end: Mapping[str, Array], planned: Mapping[str, float]) -> Iterator[_Row]:
-    """How one robot moved in its steady strides, each (strides,)."""
+    """Metrics of the motion of one robot from its steady strides, each (strides,)."""
     yield "-", "upright", float(end["upright"].min()), "1"
     yield "-", "speed_error", float(end["mean_speed"].mean() - planned["mean_speed"]), "m/s"
     yield "-", "apex_error", float(end["apex"].mean() - planned["apex"]), "m"
@@ -154,7 +157,7 @@ def _motion(end: Mapping[str, Array], planned: Mapping[str, float]) -> Iterator[
 
 
 def _settling(peaks: Array, learning: BoolArray) -> Iterator[_Row]:
-    """When the learning of one robot has settled, from its peaks (strides, 3)."""
+    """Strides until the learning of one robot has settled, from its peaks (strides, 3)."""
     if learning.any():
         counts = [_converged(peaks[:, j], learning) for j in range(1, len(JOINTS))]
         for joint, count in zip((*JOINTS[1:], "-"), (*counts, np.max(counts)), strict=True):
@@ -171,7 +174,7 @@ def _lessons(reasons: Array) -> Iterator[_Row]:
 
 
 def feedback_share(strides: xr.Dataset) -> float:
-    """RMS of the feedback torque over the sum of both RMS; NaN where there is no torque at all."""
+    """Feedback's share `rms(fb) / (rms(fb) + rms(ff))`; NaN where there is no torque at all."""
     return _share(strides["feedback"].to_numpy(), strides["feedforward"].to_numpy())
 
 
@@ -183,11 +186,11 @@ def _share(feedback: Array, feedforward: Array) -> float:
 
 
 def strides_to_converge(strides: xr.Dataset, joint: str) -> float:
-    """Strides of learning until the peak error is down to its final level, and stays there.
+    """Count the strides of learning until the peak error reaches its final level for good.
 
-    The first stride from which on every peak error (mean over the legs) misses at most `SETTLED` of
-    the improvement between the steady states before learning and at the end. NaN if learning did
-    not improve the error, or if there were no strides before it.
+    The first stride k with `p_j <= p_end + SETTLED (p_before - p_end)` for all j >= k: peak errors
+    p (means over the legs) between the steady states before learning and at the end. NaN if
+    learning did not improve the error, or if there were no strides before it.
 
     Args:
         strides: The strides of one robot.
@@ -208,7 +211,7 @@ def _converged(peak: Array, learning: BoolArray) -> float:
 
 
 def settling_stride(peak: Array, before: float, final: float) -> float:
-    """Number of strides (1 is the first) after which the peaks have settled; NaN if never."""
+    """Number of the stride (1 is the first) from which on peaks have settled; NaN if never."""
     if not final < (1.0 - LEAST_IMPROVEMENT) * before or peak.size == 0:
         return float("nan")
     outside = np.flatnonzero(peak > final + SETTLED * (before - final))
@@ -218,7 +221,7 @@ def settling_stride(peak: Array, before: float, final: float) -> float:
 
 
 def reduction(summary: pd.DataFrame, metric: str) -> pd.DataFrame:
-    """Relative reduction of an error against PD, on the same scenario, speed, seed and joint.
+    """Reduction `1 - e / e_PD` of an error, on the same scenario, speed, seed and joint.
 
     Returns:
         The rows of the other controllers with their `value` replaced by `1 - value / PD`.

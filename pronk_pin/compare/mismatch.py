@@ -1,4 +1,4 @@
-"""What can be different in a world, by name; `compare.scenario` puts it together."""
+"""Mismatches between model and world, by name; `compare.scenario` combines them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NOISE = Sensors(
 
 @dataclass(frozen=True)
 class Mismatch:
-    """One thing that is different in a world.
+    """One mismatch between model and world.
 
     Attributes:
         text: What it is.
@@ -92,7 +92,7 @@ KNOWN = {
     "push": Mismatch("push forward and back, every 4.1 s", 3.0, "N s", _push),
     "push-side": Mismatch("push to the left and right, every 4.1 s", 1.5, "N s", _side),
 }
-"""What can be different, by name."""
+"""Mismatches by name."""
 
 MISMATCHES = (
     *("payload", "weak-motors", "armature", "damping", "coulomb"),

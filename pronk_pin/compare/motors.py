@@ -1,4 +1,4 @@
-"""What acts on a robot tick by tick: motors with a delay and a speed-torque curve, and pushes."""
+"""Actuator models, with a delay and a speed-torque curve, and pushes on the trunk."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Motors:
         self._late = np.zeros((n, scenario.delay_ticks, len(tau_max)))  # commands on their way
 
     def coming(self, rows: IntArray, ticks: int) -> Array:
-        """Commands that come through in the next ticks, at most as many as they are late by.
+        """Commands that take effect in the next ticks, at most as many as the delay.
 
         Returns:
             Torques [N m], shape (m, ticks, 12).
@@ -33,13 +33,13 @@ class Motors:
         return self._late[rows, :ticks]
 
     def command(self, rows: IntArray, commands: Array, ticks: IntArray) -> None:
-        """Time goes on by so many ticks (m,), in which the commands (m, most, 12) are given."""
+        """Queue commands (m, most, 12) of so many ticks (m,), by which time goes on."""
         queue = np.concatenate([self._late[rows], commands], axis=1)
         late = np.arange(self._late.shape[1])
         self._late[rows] = queue[np.arange(len(rows))[:, None], ticks[:, None] + late]
 
     def drive(self, rows: IntArray, command: Array, rates: Array) -> Array:
-        """Torques of some of the robots at this tick [N m], shape (m, 12).
+        """Compute the torques of robots at this tick, after delay and limits [N m], shape (m, 12).
 
         Args:
             rows: Which robots, shape (m,).
@@ -53,7 +53,7 @@ class Motors:
         return np.asarray(np.where(torque * rates > 0.0, self._driven(torque, rates), torque))
 
     def _driven(self, torque: Array, rates: Array) -> Array:
-        """Torques that drive, within what is left of them at speed."""
+        """Limit driving torques to `tau_max (v_0 - |v|) / (v_0 - v_full)` at joint speed v."""
         full, none = self._scenario.full_torque_speed, self._scenario.no_load_speed
         if none is None:
             return torque
@@ -62,7 +62,7 @@ class Motors:
 
 
 def push_force(scenario: Scenario, time: Array) -> Array:
-    """Force on the trunk's centre of mass, world frame [N], shape (..., 3).
+    """Compute the pushing force on the trunk's centre of mass, world frame [N], shape (..., 3).
 
     Args:
         scenario: Its pushes.

@@ -1,4 +1,4 @@
-"""n robots that play tapes in their world, until they end or a touchdown is felt.
+"""Player of tapes: n robots in their world, until a tape ends or a touchdown is sensed.
 
 Where the law is affine servos play whole tapes; where the motors are late, as many ticks at once as
 they are; else the feedback is computed tick by tick.
@@ -48,7 +48,7 @@ _TUMBLED = np.cos(np.radians(45.0))
 
 
 class Player:
-    """Plays tapes and logs what happened.
+    """Plays tapes of n robots, and logs the motion, the torques and the sensors' readings.
 
     Several threads may play at once, each its own robots, where the trunks are locked.
 
@@ -120,7 +120,7 @@ class Player:
         self.upright = np.ones(n, dtype=bool)
 
     def play(self, rows: IntArray, tape: Tape, *, part: int | None) -> IntArray:
-        """Play tapes into the log until they end, or a flight's touchdown is felt.
+        """Play tapes into the log until they end, or a flight's touchdown is sensed.
 
         Args:
             rows: Whose.
@@ -170,7 +170,7 @@ class Player:
         return played
 
     def _next_stop(self, rows: IntArray, tick: int, airborne: bool) -> int:
-        """Up to which tick to play in one go, if the tapes do not end before."""
+        """Tick up to which to play in one go, if the tapes do not end before."""
         if not self._servos:
             return tick + max(self._ahead, 1)
         if not airborne:
@@ -179,7 +179,7 @@ class Player:
         return expected if tick < expected else tick + _CHUNK
 
     def _asked(self, motion: Motion, tape: Tape, going: IntArray, tick: int) -> Array:
-        """Torques of the feedback law along a motion from a tick on, shape (m, ticks, 12)."""
+        """Commanded torques along a motion from a tick on [N m], shape (m, ticks, 12)."""
         ticks = slice(tick, tick + motion.joints.shape[1])
         feedback = self._gains.feedback(
             tape.position[going, ticks] - motion.joints,
@@ -197,7 +197,7 @@ class Player:
         tick: int,
         part: int | None,
     ) -> Array:
-        """Torques of the feedback law at one tick, and of the balance, shape (m, 12)."""
+        """Commanded torques at one tick, the balance's included [N m], shape (m, 12)."""
         joints, rates = encoders
         feedback = self._gains.feedback(
             tape.position[going, tick] - joints, tape.velocity[going, tick] - rates
@@ -213,7 +213,7 @@ class Player:
         return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
 
     def _believed(self, rows: IntArray) -> TrunkKnown | None:
-        """What robots know of trunks that may turn: what the IMU says, or without one the truth."""
+        """Estimated state of trunks that may turn: by the IMU, or without one the true state."""
         if self._balance is None:
             return None
         if self._inertial is not None:
@@ -229,7 +229,7 @@ class Player:
         encoders: tuple[Array, Array],
         trunk: TrunkKnown | None,
     ) -> Motion:
-        """One tick's motion as the robots know it."""
+        """One tick's motion as the robots measure it."""
         joints, rates = encoders
         if trunk is not None:
             motion = motion._replace(pose=trunk.pose[:, None], twist=trunk.twist[:, None])
@@ -242,7 +242,7 @@ class Player:
     def _ends(
         self, rows: IntArray, motion: Motion, tick: int, length: IntArray, airborne: bool
     ) -> IntArray:
-        """Ticks after which the phases end, beyond the motion where they do not end in it.
+        """Detect the ticks at which phases end, beyond the motion where they do not end in it.
 
         Robots that fall in it are noted as such. One that misses its touchdown has not fallen: its
         flight ends late, with the legs held out, and the next stance begins.
@@ -262,14 +262,14 @@ class Player:
         return ends
 
     def _restart_broken(self, rows: IntArray) -> None:
-        """Put robots that left the finite numbers back to rest; they have fallen."""
+        """Reset robots with states that are not finite to rest; they have fallen."""
         broken = rows[~finite(self.world.state[rows])]
         if broken.size:
             self.world.restart(broken)
             self.upright[broken] = False
 
     def measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
-        """What the robots measured in a part of the stride of so many ticks (m,)."""
+        """Log of the robots' measurements in a part of the stride of so many ticks (m,)."""
         phase = self.seen.phase(rows, length, felt=felt)
         if not self._level_imu:
             return phase
@@ -286,7 +286,7 @@ class Player:
         return replace(phase, specific_force=force)
 
     def rewind(self, rows: IntArray, start: IntArray) -> None:
-        """The ticks from `start` (m,) on, in which a touchdown was not felt, are the stance's."""
+        """Give the ticks from `start` (m,) on, before a touchdown is sensed, to the next stance."""
         for log in {id(log): log for log in (self.log, self.seen)}.values():
             log.rewind(rows, start, self._late)
 

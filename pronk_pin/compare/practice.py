@@ -1,4 +1,4 @@
-"""When practice beats the model: the strides of learning against the level of a feedforward."""
+"""Strides of learning until the error is below that of the model's feedforward."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..control import SKIPPED
 from .metrics import by_joint, steady
 
 RIVAL = "model"
-"""The controller that practice has to beat."""
+"""The controller that learning has to beat."""
 
 LEARNER = "ilc"
 """Practice, when it is asked whether it beats the model."""
@@ -23,14 +23,14 @@ JUDGED = ("calf", "thigh")
 """Joints whose error counts."""
 
 VARIABLES = ("count", "start", "peak_error", "learning", "upright")
-"""What of the strides `practice` reads."""
+"""Variables of the strides that `practice` reads."""
 
 WINDOW = 5
 """Strides whose mean error is compared, so that one lucky or unlucky stride decides nothing."""
 
 
 class Practice(NamedTuple):
-    """What of a simulation is needed to tell when it beats another."""
+    """Peak errors of a simulation, by which it is compared with another."""
 
     settings: Mapping[str, object]
     """robot, base, scenario, controller and seed."""
@@ -64,7 +64,7 @@ def practice(strides: xr.Dataset) -> Practice:
 
 
 def strides_to_beat(peaks: Array, level: float) -> float:
-    """Strides of learning until the error is below a level, and stays there.
+    """Count the strides of learning until the error is below a level for good.
 
     The first stride below the level from which on every mean over `WINDOW` strides is, too.
 
@@ -147,7 +147,7 @@ def _place(one: Practice) -> tuple[object, ...]:
 
 
 def beaten(summary: pd.DataFrame, *, controller: str) -> tuple[float, int, int]:
-    """How many strides it took a controller to beat the model, in calf and thigh.
+    """Count the strides that it took a controller to beat the model, in calf and thigh.
 
     Returns:
         Median over the robots that did (NaN without one), how many did, and how many there are.

@@ -1,4 +1,4 @@
-"""What the analysis of a learning law predicts for a practice, beside what was measured."""
+"""Predicted errors of learning, by lifted model and rehearsal, beside the measured ones."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _WIDTH = 96
 
 @dataclass(frozen=True)
 class Prediction:
-    """A practice as predicted and as measured.
+    """Errors of the strides of learning, predicted and measured.
 
     Attributes:
         controller: Short name of the controller.
@@ -62,7 +62,7 @@ class Prediction:
 
     @property
     def factor(self) -> Array:
-        """By which factor prediction and measurement differ, thigh and calf together, a stride."""
+        """Ratio >= 1 of predicted and measured error, thigh and calf together, by stride."""
         return _factor(self.predicted, self.measured)
 
     @property
@@ -78,7 +78,7 @@ STRIDES = Interval(1, 100_000)
 def practise(
     spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario, *, robot: str, strides: int
 ) -> xr.Dataset:
-    """A short practice in simulation, with the law of the stance only, and flights as planned.
+    """Simulate a short learning run, with the law of the stance only, and flights as planned.
 
     Raises:
         InvalidInput: The controller does not learn in stance.
@@ -104,7 +104,7 @@ def practise(
 def stored_practice(
     results: Results, spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario
 ) -> xr.Dataset:
-    """The strides of a practice in a results folder that a prediction can be laid beside.
+    """Load the strides of learning from a results folder, for comparison with a prediction.
 
     The prediction covers a law of the stance, with flights as planned, on a trunk that is locked.
 
@@ -146,7 +146,7 @@ def stored_practice(
 def compare_prediction(
     spec: ControllerSpec, strides: xr.Dataset, speed: float, scenario: Scenario, *, number: int
 ) -> Prediction:
-    """Predict a practice from the last stride before it, and lay the measured strides beside.
+    """Predict the errors of learning from the last stride before it, beside the measured ones.
 
     The model has the rotors and the viscous friction of the scenario, as data sheets tell them;
     a law that needs a model has one of its own without them, as on the robot.
@@ -188,7 +188,7 @@ def compare_prediction(
 
 
 def describe_prediction(prediction: Prediction) -> str:
-    """The analysis and the comparison in words, as text for a terminal."""
+    """Format the analysis and the comparison for a terminal."""
     found = prediction.analysis
     quasi = found.quasi_static
     stable = "stable" if found.radius < 1.0 else "unstable"
@@ -232,7 +232,7 @@ def describe_prediction(prediction: Prediction) -> str:
 
 
 def _factor(one: Array, other: Array) -> Array:
-    """How many times the larger is the smaller, thigh and calf together, (strides,)."""
+    """Ratio >= 1 of two RMS errors, thigh and calf together, shape (strides,)."""
     a, b = (np.sqrt((rms[:, 1:] ** 2).mean(axis=1)) for rms in (one, other))
     return np.asarray(np.maximum(a / b, b / a))
 

@@ -1,4 +1,4 @@
-"""Where numbers come from: versions, machine, state of the source, and when.
+"""Provenance of results: versions, machine, state of the source, and time.
 
 It stands in a file of its own, provenance.json: everything else in a results folder is the same to
 the bit whenever and by however many workers it is made.
@@ -27,7 +27,7 @@ def versions() -> dict[str, str]:
 
 
 def describe_run() -> dict[str, Any]:
-    """What is to be known of a run that begins now, for provenance.json."""
+    """Describe a run that begins now, for provenance.json."""
     return {
         "started": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "versions": versions(),
@@ -77,7 +77,7 @@ def git_state(source: Path | None = None) -> str | None:
 
 
 def _git(source: Path, *arguments: str | Path) -> str | None:
-    """What a git command prints, None where it fails."""
+    """Output of a git command, None where it fails."""
     try:
         done = subprocess.run(
             ["git", "-C", source.parent, *arguments],

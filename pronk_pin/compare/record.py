@@ -1,4 +1,4 @@
-"""What happened, tick by tick in one phase, and stride by stride; preallocated."""
+"""Logs of a simulation, tick by tick in one phase, and stride by stride; preallocated."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ LONGEST_PART = 1.25
 
 
 class TickLog:
-    """The phase that n robots are in, tick by tick; the next phase overwrites it.
+    """Log of the current phase of n robots, tick by tick; the next phase overwrites it.
 
     Attributes:
         size: Ticks of the longest phase.
@@ -71,7 +71,7 @@ class TickLog:
         self.pose[..., 6] = 1.0  # level, until something else is written
 
     def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
-        """What robots did from a tick on."""
+        """Write a motion of robots from a tick on."""
         at, ticks = _compact(rows), slice(tick, tick + motion.base.shape[1])
         for name in self._states:
             getattr(self, name)[at, ticks] = getattr(motion, name)
@@ -79,7 +79,7 @@ class TickLog:
     def torques(
         self, rows: IntArray, tape: Tape, gains: Gains, tau_max: Array, played: int
     ) -> None:
-        """What the tapes that were played for so many ticks asked of the motors."""
+        """Write the torques that tapes commanded in the ticks that they were played for."""
         at, ticks = _compact(rows), slice(tape.begin, played)
         feedforward = tape.feedforward[:, ticks]
         feedback = gains.feedback(
@@ -93,7 +93,7 @@ class TickLog:
         self.missing[at, ticks] = np.clip(asked, -tau_max, tau_max) - asked
 
     def torque(self, rows: IntArray, ticks: slice) -> Array:
-        """What the motors were told, within their limits [N m], shape (m, ticks, 12)."""
+        """Commanded torque of the motors, within their limits [N m], shape (m, ticks, 12)."""
         at = _compact(rows), ticks
         torque = self.feedback[at] + self.feedforward[at]
         torque += self.missing[at]
@@ -102,12 +102,12 @@ class TickLog:
         return torque
 
     def take_torques(self, rows: IntArray, other: TickLog) -> None:
-        """Take over what another log has of the torques."""
+        """Copy the torques of another log."""
         for name in self._torques:
             getattr(self, name)[rows] = getattr(other, name)[rows]
 
     def phase(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
-        """What the controller knows of a phase that has ended after so many ticks (m,).
+        """Make the controller's log of a phase that has ended after so many ticks (m,).
 
         It may share the log's memory, and holds until something else is written.
         """
@@ -135,7 +135,7 @@ class TickLog:
         return roll_pitch_yaw(rotation_matrix(quaternion))
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
-        """So many ticks, from the ticks `start` (m,) on, are the first of the next phase."""
+        """Move the ticks from `start` (m,) on to the beginning, as the first of the next phase."""
         kept = start[:, None] + np.arange(ticks)  # (m, ticks)
         for name in (*self._states, *self._torques, *self._readings):
             channel = getattr(self, name)
@@ -178,7 +178,7 @@ class StrideLog:
         "base_rate": (2,),
         "force": (NL // 3, 3),
     }
-    """What is kept of the last strides at every tick, with the shape of one tick."""
+    """Channels of the last strides that are kept at every tick, with the shape of one tick."""
 
     def __init__(self, gaits: Sequence[Gait], duration: float, timestep: float) -> None:
         n = len(gaits)
@@ -206,13 +206,13 @@ class StrideLog:
         }
 
     def begin(self, rows: IntArray, start: Array, learning: BoolArray, *, left: Array) -> None:
-        """Strides begin at the times `start` (m,) [s], with `left` (m,) [s] to go."""
+        """Begin strides at the times `start` (m,) [s], with `left` (m,) [s] to go."""
         at = (rows, self.count[rows])
         self.scalars["start"][at], self.scalars["learning"][at] = start, learning
         self._close[rows] = left < self._near[rows]
 
     def stance(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
-        """A stance of so many ticks (m,) has ended."""
+        """Log a stance of so many ticks (m,)."""
         at = (rows, self.count[rows])
         self.peak_error[at] = np.abs(record.error).max(axis=1)
         self.rms_error[at] = np.sqrt(np.mean(record.error**2, axis=1))
@@ -222,7 +222,7 @@ class StrideLog:
         self._keep(0, rows, record, log, length)
 
     def flight(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
-        """A flight of so many ticks (m,) has ended."""
+        """Log a flight of so many ticks (m,)."""
         ticks = np.arange(int(length.max()))
         height = log.base[_compact(rows), : len(ticks), 1]
         highest = np.where(ticks < length[:, None], height, -np.inf).max(axis=1)
@@ -266,7 +266,7 @@ class StrideLog:
         heading: Array | float = 0.0,
         flight_reference: Array | float = np.nan,
     ) -> None:
-        """Strides have ended after so long (m,) [s], with the trunk at x (m,) [m].
+        """End strides after their durations (m,) [s], with the trunk at x (m,) [m].
 
         Args:
             rows: Whose.
@@ -288,7 +288,7 @@ class StrideLog:
         self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
 
     def finish(self, upright: BoolArray) -> None:
-        """The simulation has ended; a fall in an unfinished stride counts for the last finished."""
+        """End the log; a fall in an unfinished stride counts for the last finished one."""
         self.scalars["upright"][np.arange(len(upright)), np.maximum(self.count - 1, 0)] = upright
 
     def ticks(self) -> dict[str, Array]:

@@ -1,4 +1,4 @@
-"""The paper's Table I row by row beside ours, and which of its metrics could be meant.
+"""Reproduction of the paper's Table I row by row, and candidates for its error metric.
 
 The paper tabulates "tracking errors" in radians and does not say how they are taken. Every reading
 below is a number that could stand in such a table; the nearest one is the most likely.
@@ -29,7 +29,7 @@ VARIABLES = (
     *("count", "start", "learning", "planned_duration", "error"),
     *("peak_error", "rms_error", "contact_error", "upright"),
 )
-"""What of the strides the readings take."""
+"""Variables of the strides that the readings take."""
 
 
 def _legs(values: xr.DataArray) -> xr.DataArray:
@@ -102,7 +102,7 @@ def row_by_row(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") ->
 
 
 def readings(results: Results, *, learners: tuple[str, ...]) -> pd.DataFrame:
-    """Every reading of "tracking error" under PD and the learning laws, and how near it comes.
+    """Evaluate every reading of "tracking error" under PD and the learning laws.
 
     Read are the robots that stayed up.
 

@@ -1,4 +1,4 @@
-"""What the world is like, and the model does not know: the only place that says so.
+"""Scenarios: the true parameters of simulated worlds, which the model does not know.
 
 Scenarios go by name: `nominal`, `payload`, `payload=2+slope`, `ideal+delay`, `random-0-3`. A name
 is a world to begin with, and what is different in it, joined by `+`. Each mismatch has a value of
@@ -63,7 +63,7 @@ _VECTORS = {
 
 @dataclass(frozen=True)
 class Scenario:
-    """The true world of a simulation.
+    """The true parameters of a simulated world.
 
     The robot is what its URDF or MJCF says; what the scenario adds comes on top of that.
 
@@ -141,12 +141,12 @@ class Scenario:
             raise self._wrong("push_duration must be shorter than push_period")
 
     def to_json(self) -> str:
-        """Everything in it as text; `from_json` reads it."""
+        """The scenario as JSON; `from_json` reads it."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> Scenario:
-        """The scenario that `to_json` wrote.
+        """Read the scenario that `to_json` wrote.
 
         Raises:
             InvalidInput: The text is something else.

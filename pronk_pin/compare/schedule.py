@@ -1,4 +1,4 @@
-"""What happens when in a simulation."""
+"""Schedule of a simulation: start-up, baseline and learning."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LIMITS = {
 
 @dataclass(frozen=True)
 class Schedule:
-    """What happens when in a simulation: the paper's procedure (section III.A).
+    """Durations of a simulation's parts: the paper's procedure (section III.A).
 
     Attributes:
         startup: Standing in the posture of the first stride [s].

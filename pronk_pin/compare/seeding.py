@@ -1,4 +1,4 @@
-"""What learning begins with: nothing, the model, or the torque library at neighbouring speeds."""
+"""Study of the initial feedforward: none, the model's, or the library's of other speeds."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _WORDS = {"none": "nothing", "model": "the model", "library": "the library"}
 def measure_seeding(
     speeds: Sequence[float], scenario: Scenario, *, robot: str = "a1"
 ) -> pd.DataFrame:
-    """Practise at the inner speeds from each source; the library knows the others only.
+    """Learn at the inner speeds from each initial feedforward; the library holds the others only.
 
     Args:
         speeds: Increasing speeds [m/s], three or more. The library is practised at all of them,
@@ -66,7 +66,7 @@ def measure_seeding(
 
 
 def settling(table: pd.DataFrame) -> pd.DataFrame:
-    """Strides of learning until thigh and calf have settled, by controller and speed.
+    """Count the strides of learning until thigh and calf have settled, by controller and speed.
 
     All controllers have the same goal: a tenth or less missing of what learning from nothing takes
     away. It is 0 where the seed alone is there, and NaN where a robot never stays there, or falls,
@@ -99,7 +99,7 @@ def stayed_up(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def describe_seeding(table: pd.DataFrame) -> str:
-    """Medians over the speeds, with their range, as text for a terminal; without the fallen."""
+    """Format medians over the speeds, with their range, for a terminal."""
     strides, speeds = settling(table), table["speed"].nunique()
     peaks = " ".join(f"{f'stride {k}':>9}" for k in SHOWN)
     lines = [

@@ -1,4 +1,4 @@
-"""What the robot measures of itself: encoders, an IMU on the trunk, force sensors in the feet."""
+"""Sensor models: joint encoders, an IMU on the trunk, force sensors in the feet."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LIMITS = {
 
 @dataclass(frozen=True)
 class Sensors:
-    """How far the sensors are from the truth; all zero, the default, is the truth itself.
+    """Errors of the sensors: `measured = true + bias + noise`; all zero, the default, is the truth.
 
     Noise is white: independent at each tick, normal, of these standard deviations. A bias is drawn
     once for each robot and axis, normal too, and stays.
@@ -59,7 +59,7 @@ class Sensors:
         return not any(astuple(self))
 
     def scaled(self, factor: float) -> Sensors:
-        """Sensors that are so many times as bad."""
+        """Sensors with all errors scaled by a factor."""
         factor = real("factor of the sensors", factor, NOT_NEGATIVE)
         return replace(self, **{n: factor * getattr(self, n) for n in self.__dataclass_fields__})
 
@@ -87,7 +87,7 @@ class SensorSuite:
         self._imu_bias = scale * biases[:, NL:]
 
     def encoders(self, rows: IntArray, joints: Array, rates: Array) -> tuple[Array, Array]:
-        """What some robots' encoders say of their joints at one tick.
+        """Measure joint angles [rad] and velocities [rad/s] of some robots at one tick.
 
         Args:
             rows: Which robots, shape (m,).
@@ -99,11 +99,11 @@ class SensorSuite:
         return joints + angle, rates + self.sensors.rate_noise * rate
 
     def feet(self, rows: IntArray, force: Array) -> Array:
-        """What they feel of the ground's forces on their feet [N], shape (m, ..., 3)."""
+        """Measure the ground's forces on the feet [N], shape (m, ..., 3)."""
         return force + self.sensors.force_noise * self._noise(rows, force.shape[1:])
 
     def imu(self, rows: IntArray, turning: Array, specific_force: Array) -> tuple[Array, Array]:
-        """What their IMUs say over some ticks, in the trunk's frame.
+        """Measure angular velocity and specific force over some ticks, in the trunk's frame.
 
         Args:
             rows: Which robots, shape (m,).
@@ -120,7 +120,7 @@ class SensorSuite:
         )
 
     def at_rest(self, ticks: int, gravity: Array) -> tuple[Array, Array]:
-        """What all IMUs say, see `imu`, over ticks in which robots lie still, on the ground."""
+        """Measure by all IMUs, see `imu`, over ticks in which robots lie still on the ground."""
         still = np.zeros((len(self._streams), ticks, 3))
         return self.imu(np.arange(len(still)), still, still - gravity)
 

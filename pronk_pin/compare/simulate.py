@@ -1,4 +1,4 @@
-"""One simulation: n robots, one controller, one world, at 1 kHz, from event to event.
+"""Simulation of n robots, one controller and one scenario, at 1 kHz, from event to event.
 
 A stance ends by time, as its reference does; a flight ends with the touchdown that the feet feel.
 """
@@ -31,7 +31,7 @@ Progress: TypeAlias = Callable[[int], object]
 
 
 class Simulation:
-    """n robots that pronk at their own speeds under one controller in one world.
+    """Simulation of n robots at their own speeds under one controller in one scenario.
 
     All robots are played from event to event together, each on a clock of its own: one goes on in
     its stride while another already waits for the next. Each makes as many strides as begin before
@@ -104,7 +104,7 @@ class Simulation:
         self._stand(robot, rng)
 
     def _stand(self, robot: Robot, rng: np.random.Generator) -> None:
-        """Put the robots on the ground in the posture of their first stride."""
+        """Set the robots on the ground in the posture of their first stride."""
         start = np.array([0.0])
         joints = np.stack([gait.stance.joint_reference(start)[0][0] for gait in self._gaits])
         base = np.array([gait.stance.base_reference(start)[0][0] for gait in self._gaits])
@@ -145,7 +145,7 @@ class Simulation:
         return self.strides
 
     def _startup(self) -> None:
-        """Stand; the last ticks are as if the touchdown of the first stance had been felt late."""
+        """Stand; the last ticks are as if the first stance's touchdown had been sensed late."""
         rows, late = np.arange(len(self._gaits)), self.controller.spec.touchdown_ticks
         ticks = round(self.schedule.startup / self._dt) + late
         for piece in np.array_split(np.arange(ticks), -(-ticks // self.player.log.size)):
@@ -153,7 +153,7 @@ class Simulation:
         self.player.rewind(rows, np.full(len(rows), len(piece) - late))
 
     def _stride(self, rows: IntArray, *, steps: int) -> None:
-        """One stride, from touchdown to touchdown, of those robots."""
+        """Simulate one stride of some robots, from touchdown to touchdown."""
         controller, strides, player = self.controller, self.strides, self.player
         log, late = player.log, controller.spec.touchdown_ticks
         start = self._clock[rows]

@@ -110,7 +110,7 @@ def to_dataset(
 
 
 def _recorded(log: StrideLog) -> dict[str, _Variable]:
-    """What the log holds, by name, with its dimensions."""
+    """Variables of the log by name, with their dimensions."""
     per_stride, per_joint = ("speed", "stride"), ("speed", "stride", "joint")
     curve, path = (*per_stride, "part", "phase", "joint"), (*per_stride, "part", "phase", "axis")
     names = {"speed": "mean_speed"}  # the desired one is the coordinate

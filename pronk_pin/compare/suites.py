@@ -25,7 +25,7 @@ SUITES: Mapping[str, Mapping[str, Any]] = {
     },
     "paper": {"controllers": ("pd", "ilc", "ilc-paper"), "seeds": tuple(range(5))},
 }
-"""What each differs in from `Experiment()`: the paper's speeds under five controllers; the same in
+"""Changes of each suite to `Experiment()`: the paper's speeds under five controllers; the same in
 every world of the list of mismatches; practice against the model in 20 sampled worlds, at four
 speeds only, as the worlds are the sample; the control arm, which must show nothing; Table I with
 intervals over seeds, and with the paper's own learning law."""

@@ -1,4 +1,4 @@
-"""When a stored skill may be reused, and when it has to be practised again."""
+"""Study of transfer: where stored feedforward may be reused, and where learning is needed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .strides import to_dataset
 from .words import number
 
 TOLERANCE = 0.25
-"""By how much a reused skill's error may exceed that where it was learned."""
+"""Relative excess that the error may have in another task over that where it was learned."""
 COMPARED = ("thigh", "calf")
 """Joints whose errors are compared."""
 
@@ -33,7 +33,7 @@ _REPLAY = Schedule(0.5, 16.0, 0.0)  # the strides that count begin after the sta
 
 
 def may_be_reused(replayed: Array, learned: Array, *, tolerance: float = TOLERANCE) -> bool:
-    """The rule for another world: try the skill, and keep it if it tracks nearly as at home.
+    """The rule for another scenario: try the feedforward, keep it if it tracks nearly as at home.
 
     Between practised speeds `TorqueLibrary.reusable` knows without a trial.
 
@@ -48,7 +48,7 @@ def may_be_reused(replayed: Array, learned: Array, *, tolerance: float = TOLERAN
 def practise_library(
     robot: Robot, gaits: Sequence[Gait], spec: ControllerSpec, scenario: Scenario
 ) -> tuple[Simulation, TorqueLibrary]:
-    """Practise until the touchdowns have settled; the library is the mean of the last strides."""
+    """Learn until the touchdowns have settled; the library is the mean of the last strides."""
     practice = simulate(robot, gaits, spec, scenario, _PRACTICE)
     strides = to_dataset(practice.strides, robot, gaits, attributes={"robot": robot.name})
     return practice, torque_library(strides)
@@ -62,7 +62,7 @@ def measure_transfers(
     *,
     robot: str = "a1",
 ) -> pd.DataFrame:
-    """Learn at home; replay at home, at speeds left out, and in other worlds, beside practice.
+    """Compare replay at home, at speeds left out, and in other scenarios with learning there.
 
     Args:
         spec: A controller that learns.
@@ -121,7 +121,7 @@ def measure_transfers(
 
 
 def describe_transfers(table: pd.DataFrame) -> str:
-    """The transfers as text for a terminal."""
+    """Format the transfers for a terminal."""
     lines = [
         "                    stored skill [rad]   practised there [rad]   the rule",
         "task                  thigh    calf         thigh    calf",

@@ -1,4 +1,4 @@
-"""What the world does to the trunk's mass: a payload on it, its centre of mass elsewhere."""
+"""Mismatches of the trunk's mass: a payload, and a shifted centre of mass."""
 
 from __future__ import annotations
 

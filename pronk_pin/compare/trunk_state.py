@@ -1,4 +1,4 @@
-"""The trunk's state between MuJoCo's coordinates and Pinocchio's, however the trunk may move."""
+"""Conversion of the trunk's state from MuJoCo's coordinates to Pinocchio's, for every base."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..robot import Robot
 
 
 class Trunk:
-    """Where in MuJoCo's full physics state (time, qpos, qvel) a model's trunk is.
+    """Indices of a model's trunk in MuJoCo's full physics state (time, qpos, qvel).
 
     Attributes:
         x_z: Indices of the trunk's x and z.
@@ -35,7 +35,7 @@ class Trunk:
         self.turns = self._free or self._pitch is not None
 
     def put(self, state: Array, pitch: Array | float, rows: IntArray | None = None) -> None:
-        """Pitch the trunks of some robots in states (n, nstate), where they may turn."""
+        """Set the pitch of the trunks of some robots in states (n, nstate), where they may turn."""
         who = np.arange(len(state)) if rows is None else rows
         half = 0.5 * np.broadcast_to(np.asarray(pitch, dtype=float), who.shape)
         if self._free:

@@ -1,4 +1,4 @@
-"""The truth: robots in MuJoCo, built from the same URDF, with what the scenario adds.
+"""The simulated world: robots in MuJoCo, from the same URDF, with the scenario's mismatches.
 
 The base is locked to the sagittal plane without rotation, as in the paper (section III): the trunk
 has two slides, x and z. `qpos` and `qvel` stay inside this module; what it takes and gives is in
@@ -109,7 +109,7 @@ def without_warnings() -> Iterator[None]:
 
 
 class Motion(NamedTuple):
-    """What m robots did over some ticks; a state is that before the tick's step."""
+    """Motion of m robots over some ticks; a state is that before the tick's step."""
 
     base: Array
     """Trunk x and z in the world [m], shape (m, ticks, 2)."""
@@ -130,7 +130,7 @@ class Motion(NamedTuple):
 
 
 class World:
-    """n robots, each alone in the same world.
+    """n robots in MuJoCo, each alone in the same scenario.
 
     Several threads may play and advance robots at once, each its own ones.
 
@@ -139,9 +139,9 @@ class World:
         scenario: The world.
         n: Number of robots.
         base: How the trunks may move, see `build_model`.
-        servo: Gains of servos at the joints, which are then told set points (see
-            `Tape.setpoint`) and keep to the motors' limits themselves; without them the motors
-            are told torques.
+        servo: Gains of servos at the joints, whose controls are then set points (see
+            `Tape.setpoint`) and which keep to the motors' limits themselves; without them the
+            controls are torques.
 
     Attributes:
         base: Trunk x and z in the world [m], shape (n, 2).
@@ -193,7 +193,7 @@ class World:
         *,
         pitch: Array | float = 0.0,
     ) -> None:
-        """Put every robot somewhere, by default at rest.
+        """Set the state of every robot, by default at rest.
 
         Args:
             base: Trunk x and z [m], shape (n, 2).
@@ -210,7 +210,7 @@ class World:
         self._warmstart[:], self.force[:] = 0.0, 0.0
 
     def play(self, rows: IntArray, control: Array) -> Motion:
-        """What robots would do under controls (m, ticks, 12) of their motors or servos [N m].
+        """Simulate robots under controls (m, ticks, 12) of their motors or servos [N m].
 
         They stay where they are until `advance` says how far they go.
         """
@@ -258,7 +258,7 @@ class World:
         return self._scratch.data
 
     def advance(self, rows: IntArray, motion: Motion, ticks: IntArray) -> None:
-        """Let robots go so many ticks (m,) along a motion that they `play`; 1 or more each."""
+        """Advance robots by so many ticks (m,) along a motion that they `play`; 1 or more each."""
         m = np.arange(len(rows))
         self.force[rows] = motion.force[m, ticks - 1]
         self._state[rows] = motion.path[m, ticks]
@@ -309,7 +309,7 @@ class World:
         return self._state.copy()
 
     def restart(self, rows: IntArray) -> None:
-        """Put robots that left the finite numbers back to rest, so that the others go on."""
+        """Reset robots with states that are not finite to rest, so that the others go on."""
         self._state[rows] = 0.0
         self._trunk.put(self._state, 0.0, rows)
         self._state[rows[:, None], self._qpos] = self.robot.standing[7:]
@@ -318,5 +318,5 @@ class World:
 
 
 def finite(path: Array) -> BoolArray:
-    """Which of the states (..., nstate) are finite, with nothing huge (MuJoCo's limit)."""
+    """Whether states (..., nstate) are finite, with nothing huge (MuJoCo's limit)."""
     return np.asarray((np.abs(path) < mujoco.mjMAXVAL).all(axis=-1))

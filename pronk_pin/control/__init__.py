@@ -1,4 +1,4 @@
-"""What the robot is told to do: feedback, feedforward and learning, one tape a phase."""
+"""Control: feedback, feedforward and iterative learning, one tape of commands a phase."""
 
 from ..base import BASES
 from .attitude import AttitudeRegulator, attitude_angle, attitude_error, roll_pitch_yaw

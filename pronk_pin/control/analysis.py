@@ -1,4 +1,4 @@
-"""What a learning law will do along a gait, by linear algebra and before any stride is made.
+"""Convergence analysis of learning laws along a gait, by linear algebra and without a simulation.
 
 A law and the lifted model together are one affine iteration of the feedforward u and the state x at
 touchdown, `z_{k+1} = T z_k + c`. Its operator is found by asking the law itself, so that any law
@@ -28,27 +28,32 @@ _POWERS = 7
 
 
 class QuasiStatic(NamedTuple):
-    """A law on a joint that moves slowly: it needs the torque d and rests at `Kp e = d - ff`."""
+    """The law on a quasi-static joint, which needs the torque d and rests at `Kp e = d - ff`.
+
+    There the law is `ff <- memory (ff + gain Kp e)`, so that the error obeys
+    `e_{k+1} - e_inf = memory (1 - gain) (e_k - e_inf)` and
+    `e_inf = (1 - memory) / (1 - memory (1 - gain)) e_0`.
+    """
 
     memory: float
-    """Part of a constant feedforward that is kept: the DC gain of the filter, less the leak."""
+    """Share of a constant feedforward that is kept: the DC gain of the filter, less the leak."""
     gain: float
     """Total learning gain: feedback torque added to the memory, before the filter."""
 
     @property
     def multiplier(self) -> float:
-        """What a stride makes of the error's distance from its limit; diverges beyond -1."""
+        """Factor that a stride puts on the error's distance from its limit; stable within 1."""
         return self.memory * (1.0 - self.gain)
 
     @property
     def left(self) -> float:
-        """Part of the error that is left in the end."""
+        """Share of the error that remains in the limit."""
         return (1.0 - self.memory) / (1.0 - self.multiplier)
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """How a law fares along a gait, by the model.
+    """Stability, transient growth, limit and robustness of a law along a gait, by the model.
 
     Attributes:
         quasi_static: The law alone, on a joint that moves slowly.
@@ -74,7 +79,7 @@ class Analysis:
 
 
 def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = None) -> Analysis:
-    """Judge a law along a gait.
+    """Analyse the iteration of a law along a gait: stability, limit and robustness.
 
     Only what is the same on the left and on the right is looked at, since pronking is; and a law's
     treatment of strides is assumed affine, which limits of the motors are not.
@@ -88,7 +93,7 @@ def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = N
     basis = symmetric_basis(*model.shape)
     operator = iteration(law, model, basis)
     size = basis.shape[1]
-    own = iteration(law, model.within_a_stride, basis)
+    within_stride = iteration(law, model.within_a_stride, basis)
     radius = _radius(operator)
     limit = np.full(3, np.nan)
     if radius < 1.0:
@@ -96,8 +101,8 @@ def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = N
     return Analysis(
         quasi_static=quasi_static(law, model),
         radius=radius,
-        stride_radius=_radius(own),
-        largest_gain=_norm(own),
+        stride_radius=_radius(within_stride),
+        largest_gain=_norm(within_stride),
         transient=_transient(operator, size),
         limit=limit,
         with_gain_error={
@@ -110,7 +115,7 @@ def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = N
 
 
 def predict(law: LearningLaw, model: LiftedModel, begin: StrideRecord, strides: int) -> Array:
-    """Errors that the model predicts for the strides of learning [rad].
+    """Predict the errors of the strides of learning by the lifted model [rad].
 
     Args:
         law: The law.
@@ -131,7 +136,7 @@ def predict(law: LearningLaw, model: LiftedModel, begin: StrideRecord, strides: 
 
 
 def quasi_static(law: LearningLaw, model: LiftedModel) -> QuasiStatic:
-    """The law's answer to constant records, at the middle of the stance and for the calf."""
+    """Memory and gain of the law for constant records, at mid-stance and for the calf."""
     shape = (1, *model.shape)
     none, ones = np.zeros(shape), np.ones(shape)
     stiffness = model.gains.proportional[: shape[2]]
@@ -142,7 +147,9 @@ def quasi_static(law: LearningLaw, model: LiftedModel) -> QuasiStatic:
 
 
 def iteration(law: LearningLaw, model: LiftedModel, basis: Array) -> Array:
-    """The operator T of z = (u, x), with u in an orthonormal basis.
+    """Matrix T of the iteration `z_{k+1} = T z_k + c` of z = (u, x), u in an orthonormal basis.
+
+    One column at a time the law is asked for its answer to a unit of u or x, less that to zero.
 
     Args:
         law: The law.
@@ -154,19 +161,19 @@ def iteration(law: LearningLaw, model: LiftedModel, basis: Array) -> Array:
     """
     size, states = basis.shape[1], len(model.carry)
     none = model.record(*np.zeros((3, basis.shape[0])))
-    rest = law.update(none).reshape(1, -1)
+    learned_from_none = law.update(none).reshape(1, -1)
     columns = []
     for z in np.array_split(np.eye(size + states), max(1, (size + states) // 128)):
         feedforward = (z[:, :size] @ basis.T).reshape(-1, *model.shape)
         record = model.stride(feedforward, none, z[:, size:])
-        learned = law.update(_all_of_robot_0(record)).reshape(len(z), -1) - rest
+        learned = law.update(_all_of_robot_0(record)).reshape(len(z), -1) - learned_from_none
         landed = model.land(feedforward, none, z[:, size:])
         columns.append(np.hstack([learned @ basis, landed]))
     return np.asarray(np.vstack(columns).T, dtype=float)
 
 
 def symmetric_basis(samples: int, joints: int) -> Array:
-    """Orthonormal feedforwards that are the same on both sides, shape (samples * joints, m).
+    """Orthonormal basis of the left-right symmetric feedforwards, shape (samples * joints, m).
 
     Hips turn in opposite senses. For other robots than ours, with 12 joints, every feedforward.
     """
@@ -189,10 +196,10 @@ def _all_of_robot_0(record: StrideRecord) -> StrideRecord:
 def _limit(
     law: LearningLaw, model: LiftedModel, begin: StrideRecord, operator: Array, basis: Array
 ) -> Array:
-    """The errors at the fixed point, (samples, joints)."""
+    """Errors at the fixed point `z = (1 - T)^-1 c` of the iteration, (samples, joints)."""
     start = np.concatenate([basis.T @ begin.feedforward.reshape(-1), np.zeros(len(model.carry))])
-    first = basis.T @ law.update(begin).reshape(-1)
-    change = np.concatenate([first, np.zeros(len(model.carry))]) - start
+    updated = basis.T @ law.update(begin).reshape(-1)
+    change = np.concatenate([updated, np.zeros(len(model.carry))]) - start
     z = np.linalg.solve(np.eye(len(operator)) - operator, change)  # from the beginning on
     size = basis.shape[1]
     feedforward = begin.feedforward + (basis @ z[:size]).reshape(begin.feedforward.shape)
@@ -222,7 +229,7 @@ def _norm(operator: Array) -> float:
 
 
 def _transient(operator: Array, size: int) -> float:
-    """Largest norm of the powers 1, 2, 4, ... 64 of the operator, from u to u."""
+    """Largest 2-norm of the powers 1, 2, 4, ... 64 of the operator, from u to u."""
     largest, power = 0.0, operator
     for _ in range(_POWERS):
         largest = max(largest, _norm(power[:size, :size]))

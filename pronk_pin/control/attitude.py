@@ -1,4 +1,4 @@
-"""The trunk's attitude: how far it is off, and the moment that brings it back.
+"""Attitude error on SO(3), and the regulating moment on the trunk.
 
 Attitudes are rotation matrices from the trunk's to the world's axes; the x axis of the world is the
 heading that is held.
@@ -16,7 +16,9 @@ from .._typing import Array
 
 @dataclass(frozen=True)
 class AttitudeRegulator:
-    """A spring and a damper between the trunk's attitude and the gait's, through the stance legs.
+    """PD regulation of the trunk's attitude through the stance legs: `m = K e_R + D (w_d - w)`.
+
+    e_R is the geometric error of `attitude_error`, w the angular velocity in the world's axes.
 
     Attributes:
         stiffness: About x, y, z: roll, pitch, heading [N m/rad].
@@ -37,7 +39,7 @@ class AttitudeRegulator:
         keep_reals(self, {"friction": friction, "until": SHARE}, prefix)
 
     def moment(self, error: Array, rate_error: Array) -> Array:
-        """Moment on the trunk [N m], world axes, shape (n, 3).
+        """Compute the regulating moment on the trunk [N m], world axes, shape (n, 3).
 
         Args:
             error: See `attitude_error`, shape (n, 3).
@@ -47,9 +49,10 @@ class AttitudeRegulator:
 
 
 def attitude_error(rotation: Array, reference: Array) -> Array:
-    """From attitudes (..., 3, 3) to their references, as sin(angle) times the axis, world axes.
+    """Compute the attitude error on SO(3): sin(angle) times the axis to the reference, world axes.
 
-    The geometric error on SO(3) of Lee, Leok and McClamroch (2010), shape (..., 3).
+    `e_R = (R_d R^T - R R_d^T)^vee / 2` of attitudes R and references R_d, (..., 3, 3): the
+    geometric error of Lee, Leok and McClamroch (2010), shape (..., 3).
     """
     between = reference @ np.swapaxes(rotation, -1, -2)
     skew = 0.5 * (between - np.swapaxes(between, -1, -2))
@@ -57,7 +60,7 @@ def attitude_error(rotation: Array, reference: Array) -> Array:
 
 
 def attitude_angle(rotation: Array, reference: Array) -> Array:
-    """Angles between attitudes (..., 3, 3) and their references [rad], shape (...)."""
+    """Angles between attitudes (..., 3, 3) and references, `acos((tr(R_d^T R) - 1) / 2)` [rad]."""
     cosine = 0.5 * (np.einsum("...ij,...ij->...", reference, rotation) - 1.0)
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
@@ -71,8 +74,8 @@ def roll_pitch_yaw(rotation: Array) -> Array:
 
 
 def pitched(angle: Array) -> Array:
-    """Attitudes of a trunk pitched by angles (...) [rad], shape (..., 3, 3)."""
+    """Rotation matrices Ry(angle) of pitch angles (...) [rad], shape (..., 3, 3)."""
     cos, sin = np.cos(angle), np.sin(angle)
-    zero, one = np.zeros_like(cos), np.ones_like(cos)
-    rows = [[cos, zero, sin], [zero, one, zero], [-sin, zero, cos]]
+    zero, ones = np.zeros_like(cos), np.ones_like(cos)
+    rows = [[cos, zero, sin], [zero, ones, zero], [-sin, zero, cos]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -1,4 +1,4 @@
-"""Keeping a trunk up that is free to turn: what is added to the tapes at every tick.
+"""Balance of a trunk that is free to turn: torques added to the tapes at every tick.
 
 On the ground a moment on the trunk is spread over the contact forces within their friction cones,
 and the legs' transposed Jacobians turn what the forces change into torques. In the air the feet are
@@ -38,11 +38,11 @@ from .tape import Gains
 
 @dataclass(frozen=True)
 class BalanceSpec:
-    """How a trunk that is free to turn is kept up.
+    """Parameters of the balance of a trunk that is free to turn.
 
     Attributes:
-        attitude: On the ground.
-        placement: In the air.
+        attitude: Attitude regulation, on the ground.
+        placement: Foot placement, in the air.
         learned: Share of a deviation from the gait's attitude that the legs learn to undo in
             stance. With all of it (1) learning, which sees the trunk a stride late, and this
             regulation throw the trunk to and fro over tens of strides, the more the faster the
@@ -66,7 +66,11 @@ _TICKS = Interval(1, 10_000_000)
 
 
 class Balance:
-    """Runs one `BalanceSpec` on n robots, each with its own gait.
+    """Attitude regulation and foot placement of n robots, each with its own gait.
+
+    On the ground the regulating moment m is a change of the contact forces within their cones,
+    `sum r_l x dlam_l = m`, and of the torques, `dtau_l = -J_l^T dlam_l`; in the air the references
+    of the joints are those of the displaced feet, `dtau = Kp (q_placed - q_d)`.
 
     Args:
         robot: The robot.
@@ -115,7 +119,7 @@ class Balance:
         return self._reference[:, 0, 0].copy()
 
     def lift_off(self, rows: IntArray, sideways: Array) -> None:
-        """Robots leave the ground with speeds (m,) sideways [m/s], in the world."""
+        """Note the sideways speeds (m,) with which robots leave the ground, in the world [m/s]."""
         self._aside[rows] = self._spec.placement.aside(sideways)
 
     def torque(
@@ -127,34 +131,34 @@ class Balance:
         joints: Array,
         reference: Array,
     ) -> Array:
-        """What to add to the tapes' torques at one tick [N m], shape (m, 12).
+        """Compute the balancing torques at one tick, to add to the tapes' [N m], shape (m, 12).
 
         Args:
             part: Part of the stride, an index into `PARTS`.
             rows: Which robots.
             tick: Tick of their tapes.
-            trunk: What they believe of their trunks, in Pinocchio's layout: position and
-                quaternion (m, 7), velocity (m, 6).
+            trunk: Estimated state of their trunks, in Pinocchio's layout: position and quaternion
+                (m, 7), velocity (m, 6).
             joints: Their joint angles [rad], shape (m, 12).
             reference: The tapes' joint angles [rad], shape (m, 12).
         """
-        rotation, wanted = rotation_matrix(trunk[0][:, 3:7]), self._reference[rows, part, tick]
+        rotation, desired = rotation_matrix(trunk[0][:, 3:7]), self._reference[rows, part, tick]
         if part == 0:
-            added = self._ground(rows, tick, rotation, wanted, trunk[1][:, 3:6], joints)
+            added = self._ground(rows, tick, rotation, desired, trunk[1][:, 3:6], joints)
         else:
-            added = self._air(rows, tick, rotation, wanted, reference)
+            added = self._air(rows, tick, rotation, desired, reference)
         added[~np.isfinite(added)] = 0.0  # a sensor that fails must not reach the motors
         return added
 
     def unlearned(self, rows: IntArray, pose: Array, reference: Array) -> Array:
-        """What of the joints' errors in stance regulation keeps from the learning [rad].
+        """Joint errors in stance that are left to the attitude regulation, not learned [rad].
 
-        That is, but for the share that is learned, what the joints are off because the trunk is
-        turned from the gait's attitude over feet that stand where they are.
+        `(1 - learned) (q_d - q_turned)`: q_turned are the joint angles of the gait's posture over
+        feet that stand where they are, with the trunk turned as it is.
 
         Args:
             rows: Which robots.
-            pose: What they believe of their trunks at each tick, shape (m, ticks, 7).
+            pose: Estimated pose of their trunks at each tick, shape (m, ticks, 7).
             reference: The joints' references [rad], shape (m, ticks, 12).
 
         Returns:
@@ -186,19 +190,19 @@ class Balance:
         return np.asarray(np.where(np.arange(ticks) < length[:, None], angle, 0.0).max(axis=1))
 
     def _ground(
-        self, rows: IntArray, tick: int, rotation: Array, wanted: Array, spin: Array, joints: Array
+        self, rows: IntArray, tick: int, rotation: Array, desired: Array, spin: Array, joints: Array
     ) -> Array:
         regulator = self._spec.attitude
         added = np.zeros_like(joints)
         sound = np.isfinite(rotation.sum(axis=(1, 2)) + spin.sum(axis=1) + joints.sum(axis=1))
-        asked = np.flatnonzero(sound & (self._s[rows, 0, tick] < regulator.until))
-        if asked.size == 0:
+        regulated = np.flatnonzero(sound & (self._s[rows, 0, tick] < regulator.until))
+        if regulated.size == 0:
             return added
-        rows, rotation, wanted = rows[asked], rotation[asked], wanted[asked]
-        joints = joints[asked]
-        rate = -np.einsum("nij,nj->ni", rotation, spin[asked])
+        rows, rotation, desired = rows[regulated], rotation[regulated], desired[regulated]
+        joints = joints[regulated]
+        rate = -np.einsum("nij,nj->ni", rotation, spin[regulated])
         rate[:, 1] += self._rate[rows, 0, tick]
-        moment = regulator.moment(attitude_error(rotation, wanted), rate)
+        moment = regulator.moment(attitude_error(rotation, desired), rate)
         points = contact_points(self._geometry, _by_leg(joints), -self._radius * rotation[:, 2])
         arms = np.einsum("nij,nlj->nli", rotation, points.position)
         nominal = self._force[rows, tick]
@@ -206,13 +210,13 @@ class Balance:
         forces = distribute_wrench(arms, wrench, nominal, friction=regulator.friction)
         change = (forces - nominal) @ rotation  # in the trunk's axes
         torque = -np.einsum("nlij,nli->nlj", points.jacobian, change)
-        added[asked] = torque.reshape(joints.shape)
+        added[regulated] = torque.reshape(joints.shape)
         return added
 
     def _air(
-        self, rows: IntArray, tick: int, rotation: Array, wanted: Array, reference: Array
+        self, rows: IntArray, tick: int, rotation: Array, desired: Array, reference: Array
     ) -> Array:
-        turn = np.swapaxes(rotation, -1, -2) @ wanted
+        turn = np.swapaxes(rotation, -1, -2) @ desired
         offset = self._aside[rows, None] * rotation[:, 1, :]  # the world's y in the trunk's axes
         share = self._share[rows, tick]
         moved = placed(self._geometry, _by_leg(reference), turn, offset, share)

@@ -1,4 +1,4 @@
-"""When the feet touch down and lift off, from the load that they feel, with hysteresis."""
+"""Contact detection from the load on the feet, with hysteresis."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _EARLIEST_TOUCHDOWN = 0.5
 
 
 class StanceContact(NamedTuple):
-    """What the feet felt in a stance."""
+    """Contacts of n robots over one stance, as the load on their feet tells."""
 
     gap: IntArray
     """Ticks of the longest time without contact, shape (n,)."""
@@ -29,7 +29,7 @@ class StanceContact(NamedTuple):
 
 @dataclass(frozen=True)
 class ContactDetector:
-    """Contact of a robot with the ground from the load on all its feet.
+    """Detects contact by a threshold with hysteresis on the load of all feet over the weight.
 
     A contact begins where the load exceeds `touchdown`, and ends where it falls below `liftoff`;
     in between it stays what it was, so that noise does not make many contacts of one. On an A1 with
@@ -64,7 +64,7 @@ class ContactDetector:
             )
 
     def contact(self, load: Array) -> BoolArray:
-        """Whether there is contact, at each tick; none before the first.
+        """Detect contact at each tick; none before the first load above `touchdown`.
 
         Args:
             load: Load on all feet over the weight, shape (n, ticks). NaN, of a sensor that fails,
@@ -76,11 +76,11 @@ class ContactDetector:
         decided = np.where(load > self.touchdown, 1, np.where(load < self.liftoff, 0, -1))
         ticks = np.where(decided >= 0, np.arange(load.shape[1]), -1)
         latest = np.maximum.accumulate(ticks, axis=1)  # the last tick that decided
-        known = np.take_along_axis(decided, np.maximum(latest, 0), axis=1)
-        return np.asarray((latest >= 0) & (known == 1))
+        state = np.take_along_axis(decided, np.maximum(latest, 0), axis=1)
+        return np.asarray((latest >= 0) & (state == 1))
 
     def stance(self, load: Array, length: IntArray) -> StanceContact:
-        """The contacts of stances of so many ticks (n,), from their loads (n, ticks)."""
+        """Count contacts and gaps of stances of so many ticks (n,), from their loads (n, ticks)."""
         ticks = np.arange(load.shape[1])
         contact = self.contact(load) & (ticks < length[:, None])
         begins = contact & ~np.hstack([np.zeros((len(load), 1), dtype=bool), contact[:, :-1]])
@@ -89,7 +89,7 @@ class ContactDetector:
         return StanceContact(gap, begins.sum(axis=1), contact.sum(axis=1) / length)
 
     def false_touchdown(self, stance: StanceContact, length: IntArray) -> BoolArray:
-        """Whether stances began without the ground: their touchdown was none, shape (n,)."""
+        """Whether stances began without ground contact: their touchdown was false, shape (n,)."""
         return np.asarray(stance.gap > self.longest * length)
 
     def contact_lost(self, stance: StanceContact) -> BoolArray:

@@ -1,4 +1,4 @@
-"""The controller: a tape at every event, learning at every touchdown.
+"""Event-driven controller: a tape at every event, an update of the feedforward at touchdown.
 
 Control of n robots that pronk at their own speeds. The events and the clock belong to whoever plays
 the tapes; the controller is called at each touchdown, lift-off and landing of a stride.
@@ -33,11 +33,11 @@ from .symmetry import symmetric
 from .tape import Tape
 
 LATEST_TOUCHDOWN = 2.0
-"""Flight ends without a touchdown after this many times its planned duration."""
+"""Longest flight, over its planned duration, after which it ends without a touchdown."""
 
 
 _LATE_TOUCHDOWN = 1.2
-"""The tape of a flight is so many times as long as its reference, beyond which it is held."""
+"""Length of a flight's tape, over that of its reference; beyond it the last tick is held."""
 
 
 TIMESTEP = Interval(1e-5, 0.01, "s")
@@ -45,7 +45,7 @@ TIMESTEP = Interval(1e-5, 0.01, "s")
 
 
 class Controller:
-    """Runs one `ControllerSpec` on n robots, each with its own gait.
+    """The controller of one `ControllerSpec` for n robots, each with its own gait.
 
     A stride is `touchdown`, then `liftoff` with what was measured in stance, then `landing` with
     what was measured in flight.
@@ -53,8 +53,8 @@ class Controller:
     Attributes:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
-        balance: What keeps a trunk up that may turn; None where it is locked.
-        skipped: Why the robots' last strides are not worth learning from, index into `SKIPPED`,
+        balance: The balance of a trunk that may turn; None where it is locked.
+        skipped: Reason not to learn from the robots' last strides, index into `SKIPPED`,
             shape (n,).
     """
 
@@ -136,33 +136,33 @@ class Controller:
 
     @property
     def flight(self) -> Array:
-        """How long the references of the robots' flights last [s], shape (n,)."""
+        """Durations of the flights' references [s], shape (n,)."""
         return self._flight.duration.copy()
 
     @property
     def max_ticks(self) -> int:
-        """Length of the longest tape."""
+        """Length of the longest tape [ticks]."""
         return int(max(self._stance.ticks.max(), self._flight.ticks.max()))
 
     def stand(self, ticks: int = 1) -> Tape:
-        """The start-up: every robot holds the posture in which its stance begins."""
+        """Tapes of the start-up: every robot holds the posture in which its stance begins."""
         n = len(self.gaits)
         position = np.repeat(self._stance.position[:, :1], ticks, axis=1)
         zero = np.zeros_like(position)
         return Tape(zero, position, zero, np.full(n, ticks, dtype=np.intp))
 
     def touchdown(self, rows: IntArray, learning: BoolArray | None = None) -> Tape:
-        """Stance tapes for robots that have just touched down.
+        """Learn from the last stride of robots that touched down, and write their stance tapes.
 
         Args:
             rows: Which robots.
             learning: Whether they learn from their last stride first, shape (len(rows),); by
                 default none does.
         """
-        sound = self.skipped[rows] == 0
-        learns = sound & learning if learning is not None else np.zeros(len(rows), dtype=bool)
+        usable = self.skipped[rows] == 0
+        learns = usable & learning if learning is not None else np.zeros(len(rows), dtype=bool)
         self._learn(rows[learns])
-        self._retime(rows[sound if self._always_retimes else learns])
+        self._retime(rows[usable if self._always_retimes else learns])
         reference, position = self._stance, self._stance.position[rows]
         return Tape(
             feedforward=self._played(0, rows),
@@ -173,7 +173,7 @@ class Controller:
         )
 
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
-        """Flight tapes for robots that have just finished a stance, and the stance's record."""
+        """Write the flight tapes of robots that have just finished a stance, and its record."""
         record = self.record(0, rows, log)
         self._last[0].put(rows, self._learnable(record, rows, log))
         self._stood[rows] = self._judge_contact(log)
@@ -199,7 +199,7 @@ class Controller:
         duration: Array,
         upright: BoolArray | None = None,
     ) -> StrideRecord:
-        """The end of a stride: the flight's record; whether the stride is worth learning from.
+        """End a stride: make the flight's record, and judge whether the stride is learned from.
 
         Args:
             rows: Which robots.
@@ -219,18 +219,18 @@ class Controller:
             reasons.append(self.spec.selection.skipped(last)[rows])
         reasons.append(self._stood[rows])
         self._note_tilt(1, rows, log)
-        far = self._tilt[rows].max(axis=1) > self.spec.selection.tilt
-        reasons.append(np.where(far, SKIPPED.index("tilted"), 0))
+        tilted = self._tilt[rows].max(axis=1) > self.spec.selection.tilt
+        reasons.append(np.where(tilted, SKIPPED.index("tilted"), 0))
         self.skipped[rows] = np.select([reason > 0 for reason in reasons], reasons, default=0)
         return record
 
     def _note_tilt(self, part: int, rows: IntArray, log: PhaseLog) -> None:
-        """How far the trunk was from the gait's attitude, as far as the robots know."""
+        """Note the largest angle between trunk and gait in a part of the stride, as estimated."""
         if self.balance is not None and log.pose is not None:
             self._tilt[rows, part] = self.balance.tilt(part, rows, log.pose, log.length)
 
     def _judge_contact(self, log: PhaseLog) -> IntArray:
-        """Why stances were none, as indices into `SKIPPED`, shape (m,)."""
+        """Reasons for which stances do not count, as indices into `SKIPPED`, shape (m,)."""
         if log.load is None:
             return np.zeros(len(log.length), dtype=np.intp)
         detector = self.spec.contact
@@ -240,14 +240,14 @@ class Controller:
         return np.asarray(np.select(wrong, names, default=0), dtype=np.intp)
 
     def _played(self, part: int, rows: IntArray, ticks: slice = slice(None)) -> Array:
-        """The feedforward at the ticks of a part, shape (m, ticks, 12)."""
+        """Feedforward at the ticks of a part of the stride [N m], shape (m, ticks, 12)."""
         phase = (self._stance, self._flight)[part].phase[rows, ticks]
         return resample(self.feedforward[rows, part], phase * (SAMPLES - 1))
 
     def record(self, part: int, rows: IntArray, log: PhaseLog) -> StrideRecord:
-        """The record of what was measured in a part of the stride (an index into `PARTS`).
+        """Make the record of a part of the stride (an index into `PARTS`) from what was measured.
 
-        Aligned on t / T of the reference.
+        Aligned on the phase s = t / T of the reference.
         """
         reference = (self._stance, self._flight)[part]
         index = log.index(phase_grid(), reference.duration[rows] / self._timestep)
@@ -270,7 +270,7 @@ class Controller:
         )
 
     def _learnable(self, record: StrideRecord, rows: IntArray, log: PhaseLog) -> StrideRecord:
-        """The record of a stance without what is the balance's to regulate."""
+        """The record of a stance without the errors that the balance regulates."""
         if self.balance is None or log.pose is None:
             return record
         reference, ticks = self._stance, log.joints.shape[1]
@@ -289,20 +289,20 @@ class Controller:
                 self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
 
     def _told(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
-        """What a law is told of the records of some robots' last strides."""
-        told = given(record)
+        """Prepare the record that a law learns from: delivered torques, look-ahead, symmetry."""
+        learnable = given(record)
         if part == 1:
             # What the end of a flight does shows in the stance that follows it, which is yet to
             # come; it will be like the last one.
             ratio = self._flight.duration[rows] / self._stance.duration[rows]
-            told = told.onward(self._last[0].take(rows), ratio)
+            learnable = learnable.onward(self._last[0].take(rows), ratio)
             if self.balance is not None:
                 share = self.spec.balance.landing
-                told = told.changed(lambda values: share * values)
-        return symmetric(self.robot, told) if self._base == "free" else told
+                learnable = learnable.changed(lambda values: share * values)
+        return symmetric(self.robot, learnable) if self._base == "free" else learnable
 
     def _retime(self, rows: IntArray) -> None:
-        """Let the next flights of some robots last as long as practice says."""
+        """Stretch the references of the next flights of some robots to the measured durations."""
         if self.spec.timing is not None and rows.size:
             flight = self._flight
             following = self.spec.timing.next(

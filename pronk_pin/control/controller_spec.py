@@ -1,4 +1,4 @@
-"""What a controller is made of, and the controllers known by name."""
+"""Specification of controllers, and the controllers known by name."""
 
 from __future__ import annotations
 
@@ -32,31 +32,31 @@ from .regulation import LegAngleRegulator
 from .tape import Gains
 
 SOURCES = ("none", "model", "library", "identified")
-"""Where a controller's first feedforward can come from."""
+"""Sources of a controller's initial feedforward."""
 
 
 @dataclass(frozen=True)
 class ControllerSpec:
-    """A controller of the comparison: where its feedforward comes from, and whether it learns.
+    """Specification of a controller: initial feedforward, learning laws, feedback, regulation.
 
     Attributes:
         name: Short name, as on the command line.
-        source: Where its feedforward comes from at first: "none", "model", "library", or
-            "identified", the model mended by what practice found.
-        mended_gaits: Play gaits that were optimised again with the mended model.
+        source: Source of its initial feedforward: "none", "model", "library", or "identified", the
+            model with the parameters identified from learned torques.
+        mended_gaits: Play gaits that were optimised again with the identified model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
-        timing: How practice finds out how long a flight lasts; None plays it as planned. Without
-            a law, and where nobody tells how long, it does so from the first stride on.
+        timing: Adaptation of the flight's duration to the measured one; None plays it as planned.
+            Without a law, and where no duration is given, it adapts from the first stride on.
         gains: Feedback gains: eq. (9).
         regulator: Speed regulation: eq. (12).
         balance: Attitude and foot placement where the trunk is free to turn.
         selection: Strides worth learning from.
-        contact: When a contact begins and ends, and which stances are none.
+        contact: Contact detection, and which stances do not count.
         speed_filter: Time constant of the speed estimate's filter [s].
         imu: Whether there is an IMU on the trunk: its accelerometer helps that estimate, and where
             the trunk may turn it tells the attitude, which is known as it is otherwise.
-        attitude_filter: How it does.
+        attitude_filter: Filter that estimates the attitude from the IMU.
         touchdown_ticks: Ticks by which a touchdown is felt late: the stance is entered there. The
             contact sensor is one late, and the contact began between two ticks.
     """

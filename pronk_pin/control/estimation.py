@@ -1,4 +1,4 @@
-"""What the controller believes of its speed and its attitude.
+"""Estimation of the trunk's speed (leg odometry) and attitude (gyro and accelerometer).
 
 Speed: leg odometry and a first-order filter. In stance the feet do not slip, so the joint encoders
 tell the trunk's speed; in flight it stays as it was at lift-off. Section II.E of the paper. With an
@@ -28,7 +28,9 @@ SPEED_FILTER = Interval(0, 10, "s")
 
 
 class SpeedEstimator:
-    """Forward speed of n robots, one estimate a stride.
+    """Estimator of the forward speed of n robots, one estimate a stride (section II.E).
+
+    Leg odometry through a first-order low-pass, `T v' = v_legs - v`, over the ticks of stance.
 
     Attributes:
         speed: The estimates [m/s], shape (n,).
@@ -41,21 +43,21 @@ class SpeedEstimator:
         self.speed, self.sideways = np.zeros((2, n))
 
     def update(self, rows: IntArray, log: PhaseLog) -> Array:
-        """Take in a stance that some robots have just finished; their new estimates [m/s].
+        """Update the estimates of robots that have just finished a stance, and return them [m/s].
 
-        With an accelerometer it is the complementary filter T v' = v_legs - v + T a: that of the
-        legs' speed at low, of the integrated acceleration at high frequencies.
+        With an accelerometer it is the complementary filter `T v' = v_legs - v + T a`: the legs'
+        speed at low, the integrated acceleration at high frequencies.
 
         Where a sensor failed the estimate stays as it was.
         """
         n, ticks = len(rows), int(log.length.max())
         used = np.arange(ticks) < log.length[:, None]
         pose, twist = _trunk(log, n, ticks)
-        sound = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1)
-        known = np.isfinite(pose.sum(axis=-1) + twist.sum(axis=-1)) & used
-        pose[~known], twist[~known] = _LEVEL, 0.0
-        sound = (sound & known) | ~used
-        if not sound.all():
+        valid = np.isfinite(log.joints[:, :ticks] + log.joint_rates[:, :ticks]).all(axis=-1)
+        trunk_valid = np.isfinite(pose.sum(axis=-1) + twist.sum(axis=-1)) & used
+        pose[~trunk_valid], twist[~trunk_valid] = _LEVEL, 0.0
+        valid = (valid & trunk_valid) | ~used
+        if not valid.all():
             log = replace(
                 log,
                 joints=np.nan_to_num(log.joints, posinf=0.0, neginf=0.0),
@@ -69,9 +71,9 @@ class SpeedEstimator:
         forward = velocity[:, 0].reshape(n, ticks)
         if log.specific_force is not None:  # gravity does not show in the world's x
             along = rotation_matrix(pose[..., 3:])[..., 0, :]
-            felt = np.einsum("nti,nti->nt", along, log.specific_force[:, :ticks])
-            forward = forward + self._time_constant * felt
-            sound &= np.isfinite(forward) | ~used
+            acceleration = np.einsum("nti,nti->nt", along, log.specific_force[:, :ticks])
+            forward = forward + self._time_constant * acceleration
+            valid &= np.isfinite(forward) | ~used
             forward = np.where(used, forward, 0.0)
         aside = velocity[:, 1].reshape(n, ticks)
         for measured, speeds in ((forward, self.speed), (aside, self.sideways)):
@@ -82,13 +84,19 @@ class SpeedEstimator:
                 timestep=self._timestep,
             )
             latest = filtered[np.arange(n), log.length - 1]
-            speeds[rows] = np.where(sound.all(axis=1), latest, speeds[rows])
+            speeds[rows] = np.where(valid.all(axis=1), latest, speeds[rows])
         return self.speed[rows]
 
 
 @dataclass(frozen=True)
 class AttitudeFilter:
     """The explicit complementary filter on SO(3) of Mahony, Hamel and Pflimlin (2008).
+
+    With the attitude R, the gyro's rate w, the specific force f and gravity g,
+
+        R' = R (w - b_w + k (f - b_f) / g x R^T e_z)^,
+
+    where b_w and b_f are the biases at rest and e_z is the vertical.
 
     The accelerometer's vector is not normalised: in flight it tells nothing and weighs nothing,
     and over a stride of steady pronking, which begins and ends at the same speed, its mean is the
@@ -98,8 +106,8 @@ class AttitudeFilter:
     is, in the mean, taken for the bias.
 
     Attributes:
-        gain: At which a wrong attitude is righted [1/s].
-        rest: For how long it lies there [s].
+        gain: Gain k of the correction by the accelerometer [1/s].
+        rest: Time at rest in which the biases are estimated [s].
     """
 
     gain: float = 0.1
@@ -122,7 +130,7 @@ class TrunkKnown(NamedTuple):
 
 
 class AttitudeEstimator:
-    """The attitudes of n robots, tick by tick.
+    """Attitude estimator of n robots by an `AttitudeFilter`, tick by tick.
 
     Args:
         spec: The filter.
@@ -156,16 +164,16 @@ class AttitudeEstimator:
         self.rate = np.zeros_like(turning)
 
     def update(self, rows: IntArray, gyro: Array, specific_force: Array) -> None:
-        """Take in one reading of some robots' IMUs; one that is not finite changes nothing.
+        """Update by one reading of some robots' IMUs; one that is not finite changes nothing.
 
         Args:
             rows: Which robots.
             gyro: Angular velocities, trunk's axes [rad/s], shape (m, 3).
             specific_force: Accelerations less gravity, trunk's axes [m/s^2], shape (m, 3).
         """
-        sound = np.isfinite(gyro.sum(axis=1) + specific_force.sum(axis=1))
-        rows = rows[sound]
-        rate, force = gyro[sound] - self._bias[0][rows], specific_force[sound] - self._bias[1][rows]
+        valid = np.isfinite(gyro.sum(axis=1) + specific_force.sum(axis=1))
+        rows = rows[valid]
+        rate, force = gyro[valid] - self._bias[0][rows], specific_force[valid] - self._bias[1][rows]
         upward = rotation_matrix(self.quaternion[rows])[:, 2]  # the vertical in the trunk's axes
         turn = 0.5 * (self.rate[rows] + rate) + self._weight * np.cross(force, upward)
         self.rate[rows] = rate
@@ -193,7 +201,7 @@ _LEVEL = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def _trunk(log: PhaseLog, n: int, ticks: int) -> tuple[Array, Array]:
-    """Trunk's pose (n, ticks, 7) and velocity (n, ticks, 6): level where nothing else is known."""
+    """Trunk's pose (n, ticks, 7) and velocity (n, ticks, 6), level where the log has none."""
     if log.pose is not None and log.twist is not None:
         return log.pose[:, :ticks].copy(), log.twist[:, :ticks].copy()
     return np.tile(_LEVEL, (n, ticks, 1)), np.zeros((n, ticks, 6))

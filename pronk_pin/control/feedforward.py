@@ -1,4 +1,4 @@
-"""The model's feedforward: contact inverse dynamics along the gait, on the phase grid."""
+"""Model-based feedforward: contact inverse dynamics along the gait, on the phase grid."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ GUIDES: dict[str, tuple[str, ...] | None] = {
     "sagittal": ("y", "roll", "yaw"),
     "free": None,
 }
-"""What a guide holds of the trunk, by how it may move: x and z only, pitch too, or anyhow."""
+"""Trunk coordinates that the planar constraint holds, by base: all but x and z, or but x, z
+and pitch, or none."""
 
 
 def known_gaits(robot: Robot, gaits: Sequence[Gait]) -> tuple[Gait, ...]:
@@ -55,16 +56,16 @@ def model_feedforward(
     friction: float = 0.6,
     base: str = "locked",
 ) -> Array:
-    """Torques that the model asks for in stance and flight of each gait [N m].
+    """Compute the inverse-dynamics torques in stance and flight of each gait: eq. (2) [N m].
 
-    Shape (n, 2, samples, 12). Where the base is free, the legs hold what a guide would.
+    Shape (n, 2, samples, 12). Where the base is free, the legs hold what the constraint would.
 
     Raises:
         UnknownName: There is no such base; see `BASES`.
     """
     gaits = known_gaits(robot, gaits)
     guide = GUIDES[known_name("base", base, BASES)]
-    found = [
+    solutions = [
         feedforward(
             robot,
             gait,
@@ -75,4 +76,4 @@ def model_feedforward(
         )
         for gait in gaits
     ]
-    return np.stack([[one.stance, one.flight] for one in found])
+    return np.stack([[solution.stance, solution.flight] for solution in solutions])

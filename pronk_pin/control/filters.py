@@ -19,12 +19,15 @@ PAPER_A = (1.00, -2.37, 1.93, -0.53)
 rounding makes the DC gain 0.8 a pass: 36 % of the torque is lost in each stride."""
 
 _LEAK = 1e-3
-"""How far the DC gain may be from 1 without a warning."""
+"""Largest distance of the DC gain from 1 without a warning."""
 
 
 @dataclass(frozen=True)
 class ZeroPhaseFilter:
-    """An IIR filter run forward and backward along the phase: eq. (14).
+    """IIR filter run forward and backward along the phase: eq. (14).
+
+    `B(z) / A(z)` with `a_0 y_k = sum_i b_i x_{k-i} - sum_{i>0} a_i y_{k-i}`, both ways: its
+    frequency response is `|B / A|^2`, without phase.
 
     Attributes:
         b: Feedforward coefficients.
@@ -60,7 +63,7 @@ class ZeroPhaseFilter:
 
     @classmethod
     def butterworth(cls, order: int, cutoff: float) -> ZeroPhaseFilter:
-        """A Butterworth low-pass with its cut-off as a fraction of the Nyquist frequency.
+        """Make a Butterworth low-pass with its cut-off as a fraction of the Nyquist frequency.
 
         Raises:
             InvalidInput: The order is below 1, or the cut-off not between 0 and 1.
@@ -77,7 +80,7 @@ class ZeroPhaseFilter:
 
     @property
     def dc_gain(self) -> float:
-        """Gain at frequency zero, of both passes together; below 1 what was learned leaks away."""
+        """DC gain `(sum b / sum a)^2` of both passes; below 1 what was learned leaks away."""
         return float((sum(self.b) / sum(self.a)) ** 2)
 
     def __call__(self, values: Array) -> Array:
@@ -87,7 +90,10 @@ class ZeroPhaseFilter:
 
 
 def first_order(values: Array, start: Array, *, time_constant: float, timestep: float) -> Array:
-    """First-order low-pass along axis 1 of (n, samples), from a start value (n,)."""
+    """First-order low-pass along axis 1 of (n, samples), from a start value (n,).
+
+    `y_k = y_{k-1} + alpha (x_k - y_{k-1})` with `alpha = timestep / (time_constant + timestep)`.
+    """
     alpha = timestep / (time_constant + timestep)
     initial = (1.0 - alpha) * start[:, None]
     filtered, _ = signal.lfilter([alpha], [1.0, alpha - 1.0], values, axis=1, zi=initial)
@@ -95,7 +101,7 @@ def first_order(values: Array, start: Array, *, time_constant: float, timestep: 
 
 
 def look_ahead(values: Array, delta: float, onward: Array | None = None) -> Array:
-    """Values (n, samples, ...) on the phase grid, read at s + delta.
+    """Read values (n, samples, ...) on the phase grid at s + delta.
 
     Beyond the end `onward` (n, m, ...) goes on on the same spacing; then the last one is held.
     """

@@ -1,4 +1,4 @@
-"""Strides of the guided model: it pronks on tapes as the simulation does, by rigid contacts.
+"""Strides of the planar model, which pronks on tapes as the simulation does, by rigid contacts.
 
 Feet roll without slipping until the ground would have to pull, and touchdown is a plastic impact.
 A state holds the coordinates x, z and the joints, their rates, and the estimate of the speed, 29 in
@@ -24,9 +24,9 @@ from .regulation import LegAngleRegulator
 from .tape import Gains
 
 FREE = 2 + NL
-"""Coordinates that the guide leaves free: x, z, joints."""
+"""Number of coordinates that the planar constraint leaves free: x, z, joints."""
 SPEED = 2 * FREE
-"""Place of the speed estimate in the state, after the coordinates and their rates."""
+"""Index of the speed estimate in the state, after the coordinates and their rates."""
 STATES = SPEED + 1
 PLACE, RATE = slice(0, FREE), slice(FREE, SPEED)
 _STRIDES = 40
@@ -37,7 +37,7 @@ _HALF = 0.5
 
 
 class Settings(NamedTuple):
-    """What a controller does that matters for its strides; see `ControllerSpec`.
+    """Settings of a controller that shape its planar strides; see `ControllerSpec`.
 
     `share` is the part of the gait's torque that acts as feedforward on the orbit: 0 before
     learning, and about 1 after it. How long the feet stay on the ground past the planned
@@ -53,7 +53,7 @@ class Settings(NamedTuple):
 
 
 class PlayedPhase(NamedTuple):
-    """A phase as it was played: states and torques at its ticks, and what ended it."""
+    """States and torques of a played phase, tick by tick."""
 
     states: Array
     """States before each tick and after the last, shape (ticks + 1, 29)."""
@@ -64,13 +64,13 @@ class PlayedPhase(NamedTuple):
 
 
 class GuidedStrides:
-    """The strides of the guided model under one controller.
+    """Strides of the planar model under one controller.
 
     Args:
         robot: The robot.
         gait: The gait.
         settings: The controller's.
-        rotors: What the joints add to the URDF.
+        rotors: Rotor inertia and friction of the joints beyond the URDF.
     """
 
     def __init__(self, robot: Robot, gait: Gait, settings: Settings, rotors: Rotors) -> None:
@@ -94,11 +94,11 @@ class GuidedStrides:
         self.lift_off_speed = gait.stance.base_reference(np.array([1.0]))[1][0, 0]
 
     def tell(self, feedforward: Array) -> None:
-        """What to add to the feedback in the stances from now on, (samples, 12) [N m]."""
+        """Set the feedforward of the stances from now on, (samples, 12) [N m]."""
         self.torque = self.at_ticks(feedforward)
 
     def at_ticks(self, curves: Array) -> Array:
-        """Curves on the phase grid (samples, m) as they are played in a stance, (ticks, m)."""
+        """Resample curves on the phase grid (samples, m) to the ticks of a stance, (ticks, m)."""
         phase = np.arange(self.ticks, dtype=np.float64) * self.settings.timestep
         index = (phase / self.gait.stance.duration) * (SAMPLES - 1)
         played = np.asarray(resample(curves[None], index[None])[0], dtype=np.float64)
@@ -106,7 +106,7 @@ class GuidedStrides:
         return played
 
     def on_grid(self, values: Array) -> Array:
-        """What was measured at the ticks of a stance (ticks, ...), on the phase grid.
+        """Resample what was measured at the ticks of a stance (ticks, ...) to the phase grid.
 
         As `PhaseLog.index`: on t / T of the reference, held at the first and last felt tick.
         """
@@ -115,7 +115,7 @@ class GuidedStrides:
         return np.asarray(resample(values[None], index[None])[0])
 
     def stance_errors(self, stance: PlayedPhase) -> tuple[Array, Array]:
-        """Errors of a stance and their rates on the phase grid, shape (samples, 12) each."""
+        """Joint errors [rad] and rates [rad/s] of a stance on the phase grid, (samples, 12)."""
         states = stance.states[:-1]
         return (
             self.on_grid(self.stance - states[:, 2:FREE]),
@@ -123,7 +123,13 @@ class GuidedStrides:
         )
 
     def orbit(self) -> tuple[PlayedPhase, PlayedPhase, Array]:
-        """Stance, flight, and the state at touchdown before the impact, once they repeat."""
+        """Find the periodic orbit: stance, flight, and the state at touchdown before the impact.
+
+        Strides are played until the state at touchdown repeats.
+
+        Raises:
+            InvalidInput: It does not repeat.
+        """
         start = self.gait.stance.motion(self.robot, np.array([0.0]))
         base, joints, rate = start.q[0][[0, 2]], start.q[0][NB + 1 :], start.v[0]
         speed = rate[:1]
@@ -142,7 +148,7 @@ class GuidedStrides:
         )
 
     def play_stance(self, state: Array) -> PlayedPhase:
-        """One stance from a state at touchdown."""
+        """Play one stance from a state at touchdown."""
         states, torques = [state], []
         standing: list[bool] = []
         stands = True
@@ -161,7 +167,7 @@ class GuidedStrides:
         return PlayedPhase(np.array(states), np.array(torques), standing)
 
     def play_flight(self, state: Array, stands: bool) -> tuple[PlayedPhase, Array]:
-        """One flight until the feet are down: its whole ticks, and the state at touchdown."""
+        """Play one flight until the feet are down: its whole ticks, and the state at touchdown."""
         states, torques = [state], []
         standing: list[bool] = []
         turn = float(self.settings.regulator.turn(state[SPEED] - self.lift_off_speed))
@@ -172,7 +178,7 @@ class GuidedStrides:
             rate = rate - state[FREE + 2 : SPEED]
             torques.append(self.kp * error + self.kd * rate)
             following, stands = self.step(state, torques[-1], stands)
-            above, below = (self.height(self.q(one)) for one in (state, following))
+            above, below = (self.height(self.q(at)) for at in (state, following))
             if self.flight_phase[tick] > _HALF and below <= 0.0:
                 part = above / (above - below)
                 landing = state + part * (following - state)
@@ -187,7 +193,7 @@ class GuidedStrides:
     def step(
         self, state: Array, torque: Array, stands: bool, *, bound: bool = False
     ) -> tuple[Array, bool]:
-        """One tick, semi-implicit Euler; feet that stand do so until the ground would pull.
+        """Integrate one tick by semi-implicit Euler; feet stand until the ground would pull.
 
         Feet that are bound to the ground stand even then.
         """
@@ -204,7 +210,7 @@ class GuidedStrides:
         return following, stands
 
     def impact(self, state: Array) -> Array:
-        """The state at which stance begins, from that at which flight ends."""
+        """State at the beginning of stance, after the impact, from that at the end of flight."""
         after = state.copy()
         after[RATE] = planar_impact(
             self.robot, self.q(state), state[None, RATE], contact="rolling", rotors=self.rotors

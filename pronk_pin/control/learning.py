@@ -1,4 +1,4 @@
-"""Learning laws: from the record of a stride to the feedforward of the next.
+"""Iterative learning laws: from the record of a stride to the feedforward of the next.
 
 A law is a function with parameters and no state: what was learned so far is in the record.
 """
@@ -20,10 +20,10 @@ from .tape import Gains
 
 
 class LearningLaw(Protocol):
-    """Anything that turns a stride into the next feedforward."""
+    """A learning law `u_{k+1} = L(record_k)`: from a stride's record to the next feedforward."""
 
     def update(self, record: StrideRecord) -> Array:
-        """The next stride's feedforward on the phase grid [N m], shape (n, samples, 12)."""
+        """Compute the next stride's feedforward on the phase grid [N m], shape (n, samples, 12)."""
         ...
 
 
@@ -31,12 +31,12 @@ SKIPPED = (
     *("", "not finite", "fallen", "too short", "too long", "duration unknown"),
     *("false touchdown", "contact lost", "tilted"),
 )
-"""Why nothing is learned from a stride; the first where nothing is wrong with it."""
+"""Reasons for which a stride is not learned from; the first stands for none."""
 
 
 @dataclass(frozen=True)
 class StrideSelection:
-    """Which strides are worth learning from: finite, upright, and of about the right length.
+    """Criteria for strides to learn from: finite, upright, and of about the right length.
 
     Attributes:
         shortest: Shortest stride, over the reference's duration.
@@ -58,7 +58,7 @@ class StrideSelection:
         keep_reals(self, checks, "stride selection: ")
 
     def skipped(self, record: StrideRecord) -> IntArray:
-        """Why the robots' strides are not, as an index into `SKIPPED`, shape (n,)."""
+        """Reasons for which strides are not learned from, as indices into `SKIPPED`, shape (n,)."""
         parts = (record.error, record.error_rate, record.feedback, record.feedforward)
         finite = np.all([np.isfinite(part).all(axis=(1, 2)) for part in parts], axis=0)
         duration = record.relative_duration
@@ -72,31 +72,33 @@ class StrideSelection:
         return np.asarray(np.select(checks, range(1, len(checks) + 1), default=0), dtype=np.intp)
 
     def usable(self, record: StrideRecord) -> BoolArray:
-        """Which robots' strides are, shape (n,)."""
+        """Whether strides may be learned from, shape (n,)."""
         return np.asarray(self.skipped(record) == 0)
 
 
 def given(record: StrideRecord) -> StrideRecord:
-    """The record with the torques that the motors gave: what they cut off was feedback's first.
+    """The record with the torques that the motors delivered; saturation cuts the feedback first.
 
     The paper's law stores the recorded torque; what the motors could not give is not in it.
     """
     feedback = record.feedback
     cut = np.clip(record.missing, -np.abs(feedback), np.abs(feedback))
     cut = np.where(cut * feedback < 0.0, cut, 0.0)
-    rest = record.missing - cut
-    return replace(record, feedback=feedback + cut, feedforward=record.feedforward + rest)
+    feedforward_cut = record.missing - cut
+    return replace(
+        record, feedback=feedback + cut, feedforward=record.feedforward + feedforward_cut
+    )
 
 
 def anti_windup(learned: Array, record: StrideRecord, tau_max: Array) -> Array:
-    """The next feedforward [N m] without what the motors could not give.
+    """Limit the next feedforward [N m] to what the motors can deliver.
 
     Where they were at their limit in the last stride, nothing is added in that direction; and the
     memory never holds more than the limit.
 
     Args:
-        learned: What the law answers, shape (n, samples, 12).
-        record: The stride that it answers.
+        learned: Feedforward of the law, shape (n, samples, 12).
+        record: Record that it was learned from.
         tau_max: The motors' limits [N m], shape (12,).
     """
     before = record.feedforward
@@ -164,7 +166,7 @@ def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array
 
 @dataclass(frozen=True)
 class PDTypeILC:
-    """PD-type law on a memory that holds the feedforward only, with forgetting.
+    """PD-type ILC on a memory that holds the feedforward only, with forgetting.
 
     `ff <- Q[(1 - leak) ff + gain (Kp e + Kd e')(s + delta)]`
 
@@ -198,6 +200,8 @@ class PDTypeILC:
 @dataclass(frozen=True)
 class PaperILC:
     """The paper's law: eq. (10), on the recorded total torque, with the printed filter.
+
+    `ff <- Q[tau + (Kp e + Kd e')(s + delta)]` with `tau = ff + tau_b`, the recorded torque.
 
     The recorded torque already holds the feedback of the last stride, so the total learning gain
     is 2; only the filter's leak keeps the law from diverging.

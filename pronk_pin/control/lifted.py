@@ -1,7 +1,7 @@
-"""The lifted linear model: what the feedforward of a stance does to its errors, and to the next.
+"""Lifted linear model of strides: errors and next touchdown by the feedforward of a stance.
 
-Along the gait the guided robot under its feedback is a linear time-varying system. Stacked over the
-phase grid, its answer to a change of the feedforward is a matrix, and a learning law becomes an
+Along the gait the planar robot under its feedback is a linear time-varying system. Stacked over the
+phase grid, its response to a change of the feedforward is a matrix, and a learning law becomes an
 iteration that linear algebra can judge (Bristow, Tharayil and Alleyne 2006, the lifted system).
 A legged robot does not begin every trial in the same state, as ILC's textbooks assume: how it lifts
 off decides how it lands. The model therefore carries the state at touchdown from stride to stride.
@@ -22,7 +22,7 @@ from .tape import Gains
 
 @dataclass(frozen=True)
 class LiftedModel:
-    """Strides as linear maps of the feedforward u and of the state x at touchdown.
+    """Linear maps from the feedforward u and the state x at touchdown to a stride's errors.
 
         e_k = e_0 - angle u_k - angle_start x_k,    e'_k = e'_0 - rate u_k - rate_start x_k,
         x_{k+1} = carry x_k + push u_k,
@@ -31,12 +31,12 @@ class LiftedModel:
     all joints of a sample together: `u = feedforward.reshape(-1)` of size samples * joints.
 
     Attributes:
-        angle: Answer of the joint angles to the feedforward [rad/(N m)], shape (size, size).
-        rate: Answer of the joint velocities [rad/s/(N m)], shape (size, size).
-        angle_start: Answer of the joint angles to the state at touchdown, shape (size, states).
-        rate_start: Answer of the joint velocities to it, shape (size, states).
-        carry: The next touchdown's state by this one's, shape (states, states).
-        push: The next touchdown's state by the feedforward, shape (states, size).
+        angle: Response of the joint angles to the feedforward [rad/(N m)], shape (size, size).
+        rate: Response of the joint velocities [rad/s/(N m)], shape (size, size).
+        angle_start: Response of the joint angles to the state at touchdown, shape (size, states).
+        rate_start: Response of the joint velocities to it, shape (size, states).
+        carry: Derivative of the next touchdown's state by this one's, shape (states, states).
+        push: Derivative of the next touchdown's state by the feedforward, shape (states, size).
         gains: Feedback gains that the model is closed with.
         torque: Feedforward that the gait asks for [N m], shape (samples, joints).
     """
@@ -79,14 +79,14 @@ class LiftedModel:
 
     @classmethod
     def with_resets(cls, angle: Array, rate: Array, *, gains: Gains, torque: Array) -> LiftedModel:
-        """A model whose trials all begin in the same state, as in ILC's textbooks."""
+        """Make a model whose trials all begin in the same state, as in ILC's textbooks."""
         size = len(angle)
         start = np.zeros((size, 0))
         return cls(angle, rate, start, start, np.zeros((0, 0)), start.T, gains, torque)
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Samples and joints."""
+        """Numbers of samples and joints."""
         return self.torque.shape[0], self.torque.shape[1]
 
     @property
@@ -96,9 +96,9 @@ class LiftedModel:
 
     @property
     def settled(self) -> LiftedModel:
-        """The model with resets whose one stride is what this one comes to after many.
+        """The static model: its response is that of the strides once the touchdown has settled.
 
-        Its answer to a feedforward is the one once the touchdown has settled:
+        A model with resets and the response
         `angle + angle_start (1 - carry)^-1 push`.
         """
         start = np.linalg.solve(np.eye(len(self.carry)) - self.carry, self.push)
@@ -111,7 +111,7 @@ class LiftedModel:
 
     @property
     def planned(self) -> StrideRecord:
-        """The steady stride without feedforward: what lacks is the torque that the gait asks for.
+        """The steady stride without feedforward, which lacks the torque of the gait.
 
         As if flight were tracked perfectly, and the robot were the model.
         """
@@ -120,7 +120,7 @@ class LiftedModel:
         return self.record(model.angle @ u, model.rate @ u, np.zeros_like(u))
 
     def record(self, error: Array, rate: Array, feedforward: Array) -> StrideRecord:
-        """A stride's record from its errors (..., size) and its feedforward (..., size)."""
+        """Make a stride's record from its errors (..., size) and its feedforward (..., size)."""
         shape = (-1, *self.shape)
         error, rate = error.reshape(shape), rate.reshape(shape)
         joints = self.shape[1]
@@ -128,7 +128,7 @@ class LiftedModel:
         return StrideRecord.of(error, rate, feedback, feedforward.reshape(error.shape))
 
     def stride(self, feedforward: Array, begin: StrideRecord, state: Array) -> StrideRecord:
-        """The strides that follow from feedforwards and states at touchdown, from a known stride.
+        """Predict strides by their feedforwards and states at touchdown, from a recorded stride.
 
         Args:
             feedforward: Feedforwards [N m], shape (n, samples, joints).
@@ -143,17 +143,17 @@ class LiftedModel:
         return self.record(error, rate, feedforward)
 
     def land(self, feedforward: Array, begin: StrideRecord, state: Array) -> Array:
-        """How the states at the next touchdown differ; arguments of `stride`: (n, states)."""
+        """Predict differences of the next touchdown's states (n, states); arguments of `stride`."""
         change = (feedforward - begin.feedforward).reshape(len(feedforward), -1)
         return np.asarray(state @ self.carry.T + change @ self.push.T)
 
     def delayed(self, samples: int) -> LiftedModel:
-        """The same strides with a feedforward that acts some samples of the grid later."""
+        """The model with the feedforward delayed by some samples of the grid."""
         shift = np.eye(self.torque.size, k=-samples * self.shape[1])
         return self._through(shift)
 
     def scaled(self, factor: float) -> LiftedModel:
-        """The same strides with a feedforward that acts more strongly, or less."""
+        """The model with the feedforward scaled by a factor."""
         return self._through(factor * np.eye(self.torque.size))
 
     def _through(self, actuator: Array) -> LiftedModel:

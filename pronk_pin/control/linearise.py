@@ -1,6 +1,6 @@
-"""The lifted model of a gait: its strides under feedback, linearised tick by tick.
+"""Lifted model of a gait: its strides under feedback, linearised tick by tick.
 
-The guided model settles on an orbit near the gait, and along that orbit its strides are linearised.
+The planar model settles on an orbit near the gait, and along that orbit its strides are linearised.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _STEP = 1e-6
 def lifted_model(
     robot: Robot, gait: Gait, settings: Settings, *, rotors: Rotors = NO_ROTORS
 ) -> LiftedModel:
-    """The lifted model of a gait: what changes of the feedforward do, to first order.
+    """Compute the lifted model of a gait: the first-order response to changes of the feedforward.
 
     The state at touchdown holds the coordinates x, z and the joints, their rates, and the estimate
     of the speed, 29 in all; x is 0 at every touchdown, since no place is like another.
@@ -30,42 +30,42 @@ def lifted_model(
         robot: The robot.
         gait: The gait.
         settings: The controller's.
-        rotors: What the joints add to the URDF.
+        rotors: Rotor inertia and friction of the joints beyond the URDF.
 
-    Raises:
+        Raises:
         InvalidInput: The model does not settle on an orbit near the gait.
     """
     return _Linearised(robot, gait, settings, rotors).lifted()
 
 
 class _Linearised(GuidedStrides):
-    """Strides of the guided model, and what small changes do to them."""
+    """Strides of the planar model, and their linearisation."""
 
     def lifted(self) -> LiftedModel:
         """The lifted model along the orbit."""
         stance, flight, landing = self.orbit()
         played = self.at_ticks(np.eye(SAMPLES))
         inputs = np.asarray(np.kron(played, np.eye(NL)).reshape(self.ticks, NL, -1), dtype=float)
-        pushed, started = _propagate(self.steps(stance, odometry=True), inputs)
+        by_input, by_state = _propagate(self.steps(stance, odometry=True), inputs)
 
         def on_grid(values: Array) -> Array:
             return self.on_grid(values[: self.ticks]).reshape(SAMPLES * NL, -1)
 
-        onward = self.touchdown(landing, len(flight.torques)) @ self.flown(flight)
+        to_touchdown = self.touchdown(landing, len(flight.torques)) @ self.flown(flight)
         joints, rates = slice(2, FREE), slice(FREE + 2, SPEED)
         return LiftedModel(
-            angle=on_grid(pushed[:, joints]),
-            rate=on_grid(pushed[:, rates]),
-            angle_start=on_grid(started[:, joints]),
-            rate_start=on_grid(started[:, rates]),
-            carry=onward @ started[-1],
-            push=onward @ pushed[-1],
+            angle=on_grid(by_input[:, joints]),
+            rate=on_grid(by_input[:, rates]),
+            angle_start=on_grid(by_state[:, joints]),
+            rate_start=on_grid(by_state[:, rates]),
+            carry=to_touchdown @ by_state[-1],
+            push=to_touchdown @ by_input[-1],
             gains=self.settings.gains,
             torque=self.gait.stance.motion(self.robot, phase_grid()).tau,
         )
 
     def steps(self, phase: PlayedPhase, *, odometry: bool) -> list[tuple[Array, Array]]:
-        """A tick of the state under feedback, (29, 29), and its input, (29, 12), at each tick."""
+        """A_k (29, 29) and B_k (29, 12) of `x_{k+1} = A_k x_k + B_k u_k` under feedback."""
         dt, steps = self.settings.timestep, []
         share = dt / (self.settings.speed_filter + dt)
         kp, kd = _on_joints(self.kp), _on_joints(self.kd)
@@ -80,31 +80,34 @@ class _Linearised(GuidedStrides):
                 contact="rolling" if stands else None,
                 rotors=self.rotors,
             )
-            move, push = np.eye(STATES), np.zeros((STATES, NL))
-            move[RATE, PLACE] = dt * (at.da_dy - at.da_dtau @ kp)
-            move[RATE, RATE] += dt * (at.da_dv - at.da_dtau @ kd)
-            push[RATE] = dt * at.da_dtau
+            A, B = np.eye(STATES), np.zeros((STATES, NL))
+            A[RATE, PLACE] = dt * (at.da_dy - at.da_dtau @ kp)
+            A[RATE, RATE] += dt * (at.da_dv - at.da_dtau @ kd)
+            B[RATE] = dt * at.da_dtau
             if odometry:  # leg odometry, filtered
-                move[SPEED, SPEED], move[SPEED, FREE] = 1.0 - share, share
-            move[PLACE] += dt * move[RATE]
-            push[PLACE] = dt * push[RATE]
-            steps.append((move, push))
+                A[SPEED, SPEED], A[SPEED, FREE] = 1.0 - share, share
+            A[PLACE] += dt * A[RATE]
+            B[PLACE] = dt * B[RATE]
+            steps.append((A, B))
         return steps
 
     def flown(self, flight: PlayedPhase) -> Array:
-        """The state at the last tick of flight by that at lift-off, legs turned by the speed."""
+        """Derivative of the state at the last tick of flight by that at lift-off, with eq. (12)."""
         ticks = len(flight.torques)
         thigh = np.tile([0.0, 1.0, 0.0], NL // 3)
         # A turn of the reference by one radian acts as the feedback's torque does.
         turned = self.share[:ticks, None] * self.kp * thigh
         turned = turned + self.share_rate[:ticks, None] * self.kd * thigh
-        pushed, started = _propagate(self.steps(flight, odometry=False), turned[..., None])
-        end = started[-1].copy()
-        end[:, SPEED] += self.settings.regulator.gain * pushed[-1, :, 0]
+        by_turn, by_state = _propagate(self.steps(flight, odometry=False), turned[..., None])
+        end = by_state[-1].copy()
+        end[:, SPEED] += self.settings.regulator.gain * by_turn[-1, :, 0]
         return np.asarray(end)
 
     def touchdown(self, landing: Array, tick: int) -> Array:
-        """The state at which stance begins by that at the last tick of flight, (29, 29)."""
+        """Derivative of the state after the impact by that at the last tick of flight, (29, 29).
+
+        The saltation matrix: `dx+/dx- (1 - x' grad h^T / (grad h . x'))` for the feet's height h.
+        """
         step = _STEP * np.eye(STATES)[: FREE + FREE]
         q = self.q(landing)
         height = np.array(
@@ -120,34 +123,34 @@ class _Linearised(GuidedStrides):
             rotors=self.rotors,
         )
         rates = np.concatenate([landing[RATE], a, [0.0]])
-        later = np.eye(STATES)
-        later[:, : 2 * FREE] -= np.outer(rates, height) / (height[:FREE] @ landing[RATE])
-        stop = np.stack(
+        saltation = np.eye(STATES)
+        saltation[:, : 2 * FREE] -= np.outer(rates, height) / (height[:FREE] @ landing[RATE])
+        impact = np.stack(
             [
                 (self.impact(landing + d) - self.impact(landing - d)) / (2.0 * _STEP)
                 for d in _STEP * np.eye(STATES)
             ],
             axis=1,
         )
-        return np.asarray(stop @ later)
+        return np.asarray(impact @ saltation)
 
 
 def _propagate(steps: list[tuple[Array, Array]], inputs: Array) -> tuple[Array, Array]:
-    """The states at each tick, and after the last: by the inputs, and by the first state.
+    """Derivatives of the states at each tick and after the last, by inputs and first state.
 
     Args:
         steps: The ticks.
-        inputs: What pushes at each tick, shape (ticks, 12, m).
+        inputs: Torques at each tick for m inputs, shape (ticks, 12, m).
 
     Returns:
         Shapes (ticks + 1, 29, m) and (ticks + 1, 29, 29).
     """
-    pushed = np.zeros((len(steps) + 1, STATES, inputs.shape[2]))
-    started = np.repeat(np.eye(STATES)[None], len(steps) + 1, axis=0)
-    for tick, (state, push) in enumerate(steps):
-        pushed[tick + 1] = state @ pushed[tick] + push @ inputs[tick]
-        started[tick + 1] = state @ started[tick]
-    return pushed, started
+    by_input = np.zeros((len(steps) + 1, STATES, inputs.shape[2]))
+    by_state = np.repeat(np.eye(STATES)[None], len(steps) + 1, axis=0)
+    for tick, (A, B) in enumerate(steps):
+        by_input[tick + 1] = A @ by_input[tick] + B @ inputs[tick]
+        by_state[tick + 1] = A @ by_state[tick]
+    return by_input, by_state
 
 
 def _on_joints(gains: Array) -> Array:

@@ -1,9 +1,9 @@
-"""Learning laws that need a model: plant inversion and norm-optimal, along the lifted gait.
+"""Model-based learning laws: plant inversion and norm-optimal ILC, on the lifted model.
 
 A feedforward moves the errors of its own stride and, through the touchdown, those of the strides
-that follow. A law that knows only the first answer works against the second; so the laws here
-weigh the answers of several strides. And a gait's model is wrong at high frequencies, where
-it hardly answers and an inverse is large; so the feedforward is made of a few B-splines a joint.
+that follow. A law that knows only the first response works against the second; so the laws here
+weigh the responses of several strides. And a gait's model is wrong at high frequencies, where the
+response is weak and an inverse is large; so the feedforward is made of a few B-splines a joint.
 """
 
 from __future__ import annotations
@@ -23,30 +23,34 @@ from .lifted import LiftedModel
 from .record import StrideRecord
 
 SPLINES = 12
-"""B-splines a joint; 12 reach up to about five oscillations in a stance."""
+"""Number of B-splines a joint; 12 reach up to about five oscillations in a stance."""
 _DEGREE = 3
 
 
 class Answers(NamedTuple):
-    """What changes of the feedforward, along the columns of a basis, do to the errors."""
+    """Response of the errors of the strides ahead to changes of the feedforward in a basis."""
 
     basis: Array
     """Feedforwards, orthonormal columns, shape (size, m)."""
     strides: Array
-    """What each takes off the errors of the first, second, ... stride, (horizon, size, m)."""
+    """Decrease of the errors of the first, second, ... stride, shape (horizon, size, m)."""
 
     @classmethod
     def of(cls, model: LiftedModel, *, splines: int | None, horizon: int) -> Answers:
-        """The answers of a model; `splines=None` takes every sample as it is."""
+        """Compute the response of a model, `G_j = angle B + angle_start X_j`, in a basis B.
+
+        X_j is the state at the j-th touchdown: `X_{j+1} = carry X_j + push B`, `X_1 = 0`.
+        `splines=None` takes every sample as it is.
+        """
         samples, joints = model.shape
         curves = np.eye(samples) if splines is None else spline_basis(samples, splines)
         basis = np.asarray(np.kron(curves, np.eye(joints)), dtype=float)
         state = np.zeros((len(model.carry), basis.shape[1]))
-        own, pushed, answers = model.angle @ basis, model.push @ basis, []
+        direct, touchdown, responses = model.angle @ basis, model.push @ basis, []
         for _ in range(horizon):
-            answers.append(own + model.angle_start @ state)
-            state = model.carry @ state + pushed
-        return cls(basis, np.asarray(np.stack(answers), dtype=float))
+            responses.append(direct + model.angle_start @ state)
+            state = model.carry @ state + touchdown
+        return cls(basis, np.asarray(np.stack(responses), dtype=float))
 
 
 @lru_cache
@@ -60,12 +64,12 @@ def spline_basis(samples: int, splines: int) -> Array:
 
 @dataclass(frozen=True)
 class ModelBasedILC:
-    """A law that needs the lifted model of each robot's gait; `along` gives it.
+    """A learning law that needs the lifted model of each robot's gait, which `along` binds.
 
     Attributes:
         splines: B-splines a joint that make up the feedforward; None for one a sample.
-        horizon: Strides whose answers to a change are weighed.
-        answers: The models' answers, one for each robot; empty until `along`.
+        horizon: Number of strides ahead whose responses to a change are weighed.
+        answers: The models' responses, one for each robot; empty until `along`.
     """
 
     splines: int | None = field(default=SPLINES, kw_only=True)
@@ -78,11 +82,11 @@ class ModelBasedILC:
         none_or(whole, f"{prefix}splines", self.splines, Interval(_DEGREE + 1, 1000))
 
     def along(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
-        """The law for robots of these models, in the order of `StrideRecord.robot`."""
-        answers = tuple(
+        """Bind the law to models of the robots, in the order of `StrideRecord.robot`."""
+        responses = tuple(
             Answers.of(model, splines=self.splines, horizon=self.horizon) for model in models
         )
-        return replace(self, answers=answers)
+        return replace(self, answers=responses)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -101,16 +105,16 @@ class ModelBasedILC:
         return learned
 
     def _next(self, robot: int, errors: Array, memory: Array) -> Array:
-        """The next feedforwards along the basis (k, m), from errors (k, size) and the last."""
+        """Next feedforwards in the basis (k, m), from errors (k, size) and the last ones."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class PlantInversionILC(ModelBasedILC):
-    """Plant inversion: the change that would have undone the errors of all strides ahead.
+    """Plant-inversion ILC: the change that would have undone the errors of all strides ahead.
 
-    `ff <- (1 - leak) ff + gain G^+ e`, with G the mean answer over the horizon, inverted only
-    where it is not weak.
+    `ff <- (1 - leak) ff + gain G^+ e`, with G the mean response over the horizon, whose singular
+    values below `cutoff` times the largest are not inverted.
 
     Attributes:
         gain: Learning gain; 0 to 1. With a horizon of 1, 1 converges in one stride where every
@@ -137,7 +141,8 @@ class PlantInversionILC(ModelBasedILC):
         """See `ModelBasedILC.along`."""
         bound = super().along(models)
         inverses = tuple(
-            np.linalg.pinv(one.strides.mean(axis=0), rcond=self.cutoff) for one in bound.answers
+            np.linalg.pinv(response.strides.mean(axis=0), rcond=self.cutoff)
+            for response in bound.answers
         )
         return replace(self, answers=bound.answers, inverses=inverses)
 
@@ -148,11 +153,12 @@ class PlantInversionILC(ModelBasedILC):
 
 @dataclass(frozen=True)
 class NormOptimalILC(ModelBasedILC):
-    """Norm-optimal law: the least sum of squares of errors, change and feedforward, by the model.
+    """Norm-optimal ILC: the least sum of squares of errors, change and feedforward, by the model.
 
     The next feedforward minimises `mean |e_j|^2 + change |ff - ff_last|^2 + effort |ff|^2` for the
     predicted errors e_j of the strides ahead in which it is kept (Gunnarsson and Norrlof 2001;
-    several strides ahead: predictive, as in Amann, Owens and Rogers 1998).
+    several strides ahead: predictive, as in Amann, Owens and Rogers 1998). In closed form
+    `ff <- ff + (G^T G + (change + effort) 1)^-1 (G^T e - effort ff)`, means over the horizon.
 
     Attributes:
         change: Weight of the change of the feedforward [rad^2/(N m)^2]: slower, but more robust.
@@ -178,10 +184,10 @@ class NormOptimalILC(ModelBasedILC):
     def along(self, models: Sequence[LiftedModel]) -> NormOptimalILC:
         """See `ModelBasedILC.along`."""
         bound, steps = super().along(models), []
-        for one in bound.answers:
-            square = np.mean([answer.T @ answer for answer in one.strides], axis=0)
+        for response in bound.answers:
+            square = np.mean([G.T @ G for G in response.strides], axis=0)
             inverse = np.linalg.inv(square + (self.change + self.effort) * np.eye(len(square)))
-            steps.append((inverse @ one.strides.mean(axis=0).T, self.effort * inverse))
+            steps.append((inverse @ response.strides.mean(axis=0).T, self.effort * inverse))
         return replace(self, answers=bound.answers, steps=tuple(steps))
 
     def _next(self, robot: int, errors: Array, memory: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Where the feet are put down: as if the trunk had the gait's attitude, and a little aside."""
+"""Foot placement: the feet land as if the trunk had the gait's attitude, and a little aside."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from ..kinematics.legs import LegGeometry, leg_angles, leg_motion
 
 @dataclass(frozen=True)
 class FootPlacement:
-    """Turns the feet in flight into the world's axes, and puts them aside of a drifting trunk.
+    """Foot placement in flight: feet in the world's axes, and aside of a drifting trunk.
+
+    `p <- p + share(s) (R^T R_d p + R^T e_y clip(gain v_y) - p)` for a foot p in the trunk's frame,
+    with the attitude R, the gait's R_d and the speed sideways v_y.
 
     The joints' references in stance then pull the trunk to the gait's attitude; a foot put down in
     the direction of the drift brakes it. Forward that is eq. (12), see `LegAngleRegulator`.
@@ -41,20 +44,20 @@ class FootPlacement:
         return np.clip(self.gain * speed, -self.limit, self.limit)
 
     def share(self, s: Array) -> Array:
-        """Share of the way that the feet have gone at the phase s of flight."""
+        """Share of their displacement that the feet have reached at the phase s of flight."""
         x = np.clip(s / self.settled, 0.0, 1.0)
         return np.asarray(x * x * (3.0 - 2.0 * x))
 
 
 def placed(geometry: LegGeometry, joints: Array, turn: Array, offset: Array, share: Array) -> Array:
-    """Joint angles with the feet moved: turned about the trunk's origin, and displaced.
+    """Compute joint angles with the feet turned about the trunk's origin and displaced.
 
     Args:
         geometry: Offsets of the legs.
         joints: Joint angles that put the feet where the gait has them [rad], shape (n, legs, 3).
         turn: From the gait's attitude of the trunk to the actual axes, shape (n, 3, 3).
         offset: Displacement in the trunk's actual axes [m], shape (n, 3).
-        share: Share of the move, 0 to 1, shape (n,).
+        share: Share of the displacement, 0 to 1, shape (n,).
 
     Returns:
         Shape (n, legs, 3); the given angles where the feet would be out of reach.

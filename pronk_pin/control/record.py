@@ -1,4 +1,4 @@
-"""What a stride was like: the record from which a controller learns."""
+"""Stride records: the logs and curves from which a controller learns."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ ONWARD = 32
 
 @dataclass(frozen=True)
 class PhaseLog:
-    """What n robots measured and commanded over one phase, tick by tick.
+    """Measurements and commands of n robots over one phase, tick by tick.
 
     Attributes:
         joints: Joint angles [rad], shape (n, ticks, 12).
         joint_rates: Joint velocities [rad/s], shape (n, ticks, 12).
         feedback: Torque of the feedback [N m], shape (n, ticks, 12).
         feedforward: Torque of the feedforward [N m], shape (n, ticks, 12).
-        missing: What the motors' limits cut off: torque given minus asked for [N m], shape
+        missing: Torque that the motors' limits cut off: delivered minus commanded [N m], shape
             (n, ticks, 12).
         length: Ticks that the phase lasted; later ones hold nothing of it, shape (n,).
-        felt: Tick at which its beginning was felt: those before were played on the tape before.
-        load: Vertical force on all feet [N], shape (n, ticks); None where nothing feels it.
-        pose: Trunk's position and quaternion as the robots believe them, shape (n, ticks, 7); None
-            where the trunk is level.
+        felt: Tick at which its beginning was sensed: those before were played on the tape before.
+        load: Vertical force on all feet [N], shape (n, ticks); None without force sensors.
+        pose: Estimated position and quaternion of the trunk, shape (n, ticks, 7); None where the
+            trunk is level.
         twist: Trunk's velocity in its own axes, likewise, shape (n, ticks, 6).
-        specific_force: What the accelerometer says, in the trunk's frame [m/s^2], shape
+        specific_force: Reading of the accelerometer, in the trunk's frame [m/s^2], shape
             (n, ticks, 3); None without an IMU.
     """
 
@@ -55,7 +55,7 @@ class PhaseLog:
     specific_force: Array | None = None
 
     def index(self, s: Array, ticks: Array | None = None) -> Array:
-        """Fractional ticks at which phases s (m,) were measured, shape (n, m).
+        """Compute the fractional ticks at which phases s (m,) were measured, shape (n, m).
 
         Args:
             s: Phases.
@@ -69,9 +69,9 @@ class PhaseLog:
 
 @dataclass(frozen=True)
 class StrideRecord:
-    """One part of a stride of n robots on the phase grid: the stance, or the flight.
+    """Record of one part of a stride of n robots on the phase grid: the stance, or the flight.
 
-    A stance is recorded from the touchdown's being felt on, a flight until it is felt.
+    A stance is recorded from the tick on at which the touchdown is sensed, a flight until it is.
 
     Arrays have the shape (n, samples, 12) where nothing else is said. Phases s = t / T are those of
     the reference; what was not measured holds the nearest value that was.
@@ -81,10 +81,10 @@ class StrideRecord:
         error_rate: Its time derivative [rad/s].
         feedback: Torque of the feedback, eq. (9) [N m].
         feedforward: Torque of the feedforward [N m].
-        missing: What the motors' limits cut off: torque given minus asked for [N m].
+        missing: Torque that the motors' limits cut off: delivered minus commanded [N m].
         relative_duration: Duration of the stride over the reference's, shape (n,); NaN as long as
             the stride goes on.
-        contact_error: Largest error between the contact and its being felt [rad], shape (n, 12).
+        contact_error: Largest error between the contact and its detection [rad], shape (n, 12).
         error_onward: The error beyond s = 1, shape (n, ONWARD, 12): the last one, where nothing
             else was put there by `onward`.
         rate_onward: The error's time derivative likewise.
@@ -106,7 +106,7 @@ class StrideRecord:
 
     @classmethod
     def unknown(cls, n: int) -> StrideRecord:
-        """The record of n robots that have made no stride yet: NaN."""
+        """Make the record of n robots that have made no stride yet: NaN."""
         shapes = [(n, SAMPLES, NL)] * 5 + [(n,), (n, NL)] + [(n, ONWARD, NL)] * 2
         names = [item.name for item in fields(cls)]
         unknown = {name: np.full(shape, np.nan) for name, shape in zip(names, shapes, strict=False)}
@@ -116,7 +116,7 @@ class StrideRecord:
     def of(
         cls, error: Array, error_rate: Array, feedback: Array, feedforward: Array
     ) -> StrideRecord:
-        """The record of strides in which nothing went wrong: arrays (n, samples, joints)."""
+        """Make the record of regular strides from arrays (n, samples, joints)."""
         n, _, joints = error.shape
         return cls(
             error=error,
@@ -133,7 +133,7 @@ class StrideRecord:
         )
 
     def onward(self, following: StrideRecord, ratio: Array) -> StrideRecord:
-        """The record as one that goes on into another part of the stride.
+        """The record continued beyond s = 1 by another part of the stride.
 
         Args:
             following: That part, of the same robots.
@@ -147,7 +147,7 @@ class StrideRecord:
         )
 
     def less(self, error: Array, error_rate: Array, feedback: Array) -> StrideRecord:
-        """The record without a part of its errors and their rates, and the feedback to that part.
+        """The record less some errors and rates, and the feedback to them.
 
         Each has the shape (n, samples, 12).
         """
@@ -162,7 +162,7 @@ class StrideRecord:
         )
 
     def changed(self, change: Callable[[Array], Array]) -> StrideRecord:
-        """The record whose errors, their rates, and the feedback to them are changed alike."""
+        """The record with one linear change of errors, rates and feedback."""
         return replace(
             self,
             error=change(self.error),
@@ -183,17 +183,17 @@ class StrideRecord:
 
 
 def held(values: Array) -> Array:
-    """The last of the values (n, samples, ...), as they are beyond s = 1: (n, ONWARD, ...)."""
+    """The last of the values (n, samples, ...), repeated beyond s = 1: (n, ONWARD, ...)."""
     return np.repeat(values[:, -1:], ONWARD, axis=1)
 
 
 def phase_grid(samples: int = SAMPLES) -> Array:
-    """Phases of the grid, shape (samples,)."""
+    """Phases of the grid, evenly from 0 to 1, shape (samples,)."""
     return np.linspace(0.0, 1.0, whole("samples", samples, Interval(2, 100_000)))
 
 
 def resample(values: Array, position: Array) -> Array:
-    """Linear interpolation along axis 1 at fractional indices.
+    """Interpolate linearly along axis 1 at fractional indices.
 
     Args:
         values: Samples, shape (n, m, ...).
@@ -208,10 +208,10 @@ def resample(values: Array, position: Array) -> Array:
     weight = (position - lower).reshape(-1, 1)
     # Whole samples are gathered from one long list of them: much faster than two indices.
     samples, begin = values.reshape(n * m, -1), m * np.arange(n)[:, None]
-    found = samples.take((begin + lower).ravel(), axis=0)
+    values_below = samples.take((begin + lower).ravel(), axis=0)
     change = samples.take((begin + np.minimum(lower + 1, m - 1)).ravel(), axis=0)
     with np.errstate(invalid="ignore"):  # what is not finite gives what is not finite
-        change -= found
+        change -= values_below
         change *= weight
-        change += found
+        change += values_below
     return np.asarray(change.reshape(*position.shape, *values.shape[2:]))

@@ -1,4 +1,4 @@
-"""What gaits ask for, tick by tick: the tape's references, and how long a flight lasts."""
+"""Joint references of gaits, tick by tick, and the adaptation of the flight's duration."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from .._typing import Array, IntArray
 from ..gait import GaitPhase
 
 _NOTICED = 2e-5
-"""Change of a duration [s] below which a reference stays as it is."""
+"""Change of a duration [s] below which a reference stays unchanged."""
 
 
 @dataclass(frozen=True)
 class FlightTiming:
-    """The flight's reference lasts as long as the last flights did.
+    """Adaptation of the duration of the flight's reference to that of the last flights.
+
+    `T_{k+1} = T_k + gain (T_measured - T_k)`, within `limit` of the planned duration.
 
     The legs swing at 20 rad/s when they touch down. A flight that lasts 5 ms longer than planned
     (motors that act late push for longer) ends 0.1 rad from the posture in which the stance begins,
@@ -25,7 +27,7 @@ class FlightTiming:
 
     Attributes:
         gain: Part of the difference that is taken over in a stride; 0 to 1.
-        limit: Largest change of the planned duration, over it.
+        limit: Largest relative change of the planned duration.
     """
 
     gain: float = 0.5
@@ -36,14 +38,14 @@ class FlightTiming:
         keep_reals(self, checks, "a flight's timing: ")
 
     def next(self, duration: Array, measured: Array, planned: Array) -> Array:
-        """The next flight's duration from that of the reference, of the flight, and of the gait."""
+        """Compute the next reference's duration from the last, the measured and the planned [s]."""
         following = duration + self.gain * (measured - duration)
         return np.clip(following, (1.0 - self.limit) * planned, (1.0 + self.limit) * planned)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What n gaits ask for in one part of the stride, at each tick.
+    """Joint references of n gaits in one part of the stride, at each tick.
 
     Attributes:
         parts: That part of each gait.
@@ -80,7 +82,7 @@ class Reference:
         return reference
 
     def stretch(self, rows: IntArray, duration: Array) -> None:
-        """Let the part of some robots last so long [s], shape (m,); postures stay the same."""
+        """Stretch the references of some robots to durations (m,) [s]; postures stay the same."""
         noticed = np.abs(duration - self.duration[rows]) > _NOTICED
         self.duration[rows[noticed]] = duration[noticed]
         self._tabulate(rows[noticed])
@@ -98,6 +100,6 @@ class Reference:
             self.velocity[row, end:] = 0.0
 
     def ends(self, rows: IntArray) -> IntArray:
-        """Ticks after which nothing changes any more in the references of some robots, (m,)."""
+        """Ticks after which the references of some robots are constant, shape (m,)."""
         ends = np.ceil(self.duration[rows] / self.timestep).astype(np.intp) + 1
         return np.minimum(ends, self.phase.shape[1])

@@ -1,4 +1,4 @@
-"""Speed regulation: where the legs are put down, eq. (12)."""
+"""Speed regulation by the leg angle at touchdown: eq. (12)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .._typing import Array
 
 @dataclass(frozen=True)
 class LegAngleRegulator:
-    """Turns the legs in flight in proportion to the speed error: eq. (12).
+    """Regulates the speed by turning the legs in flight: `dtheta = K_theta (v - v_d)`, eq. (12).
 
     The leg angle theta = q_thigh + q_calf / 2 grows backwards, so a robot that is too fast needs a
     smaller one: the gain is negative.
@@ -40,6 +40,6 @@ class LegAngleRegulator:
         return np.clip(self.gain * speed_error, -self.limit, self.limit)
 
     def profile(self, s: Array) -> tuple[Array, Array]:
-        """Share of the change that is reached at the phase s, and its derivative by s."""
+        """Smooth step `x^2 (3 - 2 x)`, x = s / settled, of the change; and its derivative by s."""
         x = np.clip(s / self.settled, 0.0, 1.0)
         return x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / self.settled

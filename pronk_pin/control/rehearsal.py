@@ -1,4 +1,4 @@
-"""A practice rehearsed in the model: learning as it would go if the model were the robot.
+"""Rehearsal: learning simulated in the planar model, as if the model were the robot.
 
 The lifted model is a first-order one, and a law that changes its feedforward in large steps leaves
 its range: legs that swing at 20 rad/s are held once the flight's reference has ended, so that a
@@ -18,12 +18,12 @@ from .record import StrideRecord
 
 
 def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, number: int) -> Array:
-    """Errors of the strides of learning, by the model's own practice [rad].
+    """Predict the errors of the strides of learning by simulating them in the model [rad].
 
-    What the model gets wrong of the stride before the learning is taken to stay as it is.
+    The model's error in the stride before the learning is taken to stay as it is.
 
     Args:
-        strides: The model's; they are told the feedforwards of the practice.
+        strides: The strides of the planar model, whose feedforward is set.
         law: The law of the stance.
         begin: The last stride before learning, of one robot.
         number: How many strides of learning.
@@ -38,9 +38,9 @@ def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, numb
     gains, record = strides.settings.gains, begin
     strides.tell(begin.feedforward[0])
     stance, _, landing = strides.orbit()
-    missed, missed_rate = (
-        known[0] - own
-        for known, own in zip(
+    error_offset, rate_offset = (
+        recorded[0] - simulated
+        for recorded, simulated in zip(
             (begin.error, begin.error_rate), strides.stance_errors(stance), strict=True
         )
     )
@@ -55,7 +55,7 @@ def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, numb
         except InvalidInput:  # it does not come down
             break
         error, rate = strides.stance_errors(stance)
-        errors[k], rate = error + missed, rate + missed_rate
+        errors[k], rate = error + error_offset, rate + rate_offset
         feedback = gains.proportional * errors[k] + gains.derivative * rate
         record = StrideRecord.of(errors[k][None], rate[None], feedback[None], feedforward)
     return errors

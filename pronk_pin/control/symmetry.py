@@ -1,4 +1,4 @@
-"""What is the same on the left and on the right: all that a law may learn where roll is free."""
+"""Left-right symmetry of records: all that a law may learn where roll is free."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from .record import StrideRecord
 
 
 def mirrored(robot: Robot, joints: Array) -> Array:
-    """Joint quantities (..., 12) of the mirror image about the sagittal plane."""
+    """Mirror joint quantities (..., 12) about the sagittal plane."""
     legs = joints.reshape(*joints.shape[:-1], -1, len(JOINTS))
     sign = np.array([-1.0, 1.0, 1.0])  # the hips turn about x
     return np.asarray((legs[..., _partners(robot), :] * sign).reshape(joints.shape))
 
 
 def symmetric(robot: Robot, record: StrideRecord) -> StrideRecord:
-    """The record with errors and feedback that are means of left and right.
+    """Average errors and feedback of a record over left and right.
 
     Learned from it, a feedforward changes neither roll nor heading: their errors stay with the
     attitude's regulation, which would otherwise fight what is learned of them.
@@ -34,8 +34,8 @@ def symmetric(robot: Robot, record: StrideRecord) -> StrideRecord:
 
 @lru_cache(maxsize=16)
 def _partners(robot: Robot) -> tuple[int, ...]:
-    """For each leg the one on the other side of the trunk."""
+    """For each leg the index of the one on the other side of the trunk."""
     hips = leg_geometry(robot).hip
-    other = hips * np.array([1.0, -1.0, 1.0])
-    distance = np.linalg.norm(hips[None] - other[:, None], axis=-1)
+    mirrored_hips = hips * np.array([1.0, -1.0, 1.0])
+    distance = np.linalg.norm(hips[None] - mirrored_hips[:, None], axis=-1)
     return tuple(int(k) for k in np.argmin(distance, axis=1))

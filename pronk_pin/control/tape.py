@@ -1,4 +1,4 @@
-"""Between two events everything is a tape: feedforward torque and reference at every tick.
+"""Tapes: feedforward torque and reference at every tick between two events.
 
 A controller writes a tape at each touchdown and lift-off; the simulation plays it:
 `tau = ff + kp (q_d - q) + kd (v_d - v)`, clipped to the motors' limits. That is affine in q and v,
@@ -43,7 +43,9 @@ class Gains:
         return np.tile(self.kd, NL // 3)
 
     def feedback(self, error: Array, error_rate: Array) -> Array:
-        """Kp e + Kd e' [N m], eq. (9); 0 where a sensor failed, which must not reach the motors.
+        """Compute the feedback torque Kp e + Kd e' [N m], eq. (9); 0 where a sensor failed.
+
+        A sensor that fails must not reach the motors.
 
         Args:
             error: Reference minus measured joint angles [rad], shape (..., 12).
@@ -58,7 +60,9 @@ class Gains:
 
 @dataclass(frozen=True)
 class Tape:
-    """What n robots are told for one phase, at each tick.
+    """Commands of n robots for one phase, at each tick: feedforward and joint reference.
+
+    A tape is played as `tau = clip(ff + Kp (q_d - q) + Kd (v_d - v))`, feedback as in eq. (9).
 
     Attributes:
         feedforward: Torques [N m], shape (n, ticks, 12).
@@ -66,7 +70,7 @@ class Tape:
         velocity: Reference joint velocities [rad/s], shape (n, ticks, 12).
         length: Ticks after which each robot's phase ends at the latest, shape (n,): more than are
             on the tape, where the last of them is to be held, see `held`.
-        begin: Tick at which to begin: those before have passed already.
+        begin: Tick at which to begin; those before have passed already.
     """
 
     feedforward: Array
@@ -77,11 +81,11 @@ class Tape:
 
     @property
     def ticks(self) -> int:
-        """Ticks that are on the tape."""
+        """Number of ticks on the tape."""
         return int(self.position.shape[1])
 
     def held(self, ticks: int) -> Tape:
-        """The tape with so many ticks on it, or more: the last one is held."""
+        """Extend the tape to `ticks` ticks, if it is shorter, by holding the last one."""
         if ticks <= self.ticks:
             return self
         index = np.minimum(np.arange(ticks), self.ticks - 1)
@@ -89,12 +93,12 @@ class Tape:
         return replace(self, **{name: getattr(self, name)[:, index] for name in names})
 
     def setpoint(self, gains: Gains) -> Array:
-        """What servos with these gains are told: the torque at q = v = 0 [N m], (n, ticks, 12)."""
+        """Set points of servos with these gains: the torque at q = v = 0 [N m], (n, ticks, 12)."""
         return (
             self.feedforward + gains.proportional * self.position + gains.derivative * self.velocity
         )
 
 
 def clip_torque(feedback: Array, feedforward: Array, tau_max: Array) -> Array:
-    """The torque that the motors are told: the sum, within their limits [N m]."""
+    """Commanded torque: the sum of feedforward and feedback, within the motors' limits [N m]."""
     return np.clip(feedforward + feedback, -tau_max, tau_max)

@@ -1,4 +1,4 @@
-"""The torque library: learned feedforward by speed, the "muscle memory" of section III.B."""
+"""Torque library: learned feedforward by speed, the "muscle memory" of section III.B."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from .record import resample
 SCHEMA = 2
 """Version of the file format."""
 LANDS_ALIKE = 5e-4
-"""Difference of two flights [s] below which they were practised for the same touchdown: contact is
-felt at whole milliseconds."""
+"""Difference of two flights [s] below which they were learned for the same touchdown: contact is
+sensed at whole milliseconds."""
 _ROUNDING = 1e-6
 _AGAIN = "practise again, and save it with TorqueLibrary.save"
 
 
 class Skill(NamedTuple):
-    """What n robots begin with; None is nothing."""
+    """Initial feedforward and flight durations of n robots; None is none."""
 
     feedforward: Array | None = None
     """Torques on the phase grids of stance and flight [N m], shape (n, 2, samples, 12)."""
     flight: Array | None = None
-    """How long the references of the flights last [s], shape (n,); None as planned."""
+    """Durations of the flights' references [s], shape (n,); None as planned."""
 
 
 @dataclass(frozen=True)
 class TorqueLibrary:
-    """Torques by speed, averaged over strides in steady state.
+    """Learned torques by speed, averaged over strides in steady state.
 
     Attributes:
         speeds: Increasing speeds [m/s], shape (n,).
         torque: Mean feedforward on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
         spread: Its standard deviation over the strides [N m], of the same shape.
-        flight: How long the flights lasted for which they were learned [s], shape (n,); see
+        flight: Durations of the flights for which they were learned [s], shape (n,); see
             `FlightTiming`.
     """
 
@@ -71,7 +71,7 @@ class TorqueLibrary:
 
     @classmethod
     def from_strides(cls, speeds: Array, torque: Array, flight: Array) -> TorqueLibrary:
-        """Average over strides: means of the torques, medians of the durations.
+        """Average learned strides: means of the torques, medians of the flights' durations.
 
         Args:
             speeds: Increasing speeds [m/s], shape (n,).
@@ -83,7 +83,7 @@ class TorqueLibrary:
         return cls(speeds, mean, spread, np.nanmedian(flight, axis=1))
 
     def at(self, speeds: Array) -> Array:
-        """Torques at given speeds (m,), interpolated between neighbours [N m], (m, 2, ...).
+        """Interpolate the torques at speeds (m,) between neighbours [N m], shape (m, 2, ...).
 
         Raises:
             SpeedOutOfRange: The library does not cover a speed.
@@ -91,9 +91,9 @@ class TorqueLibrary:
         return np.asarray(resample(self.torque[None], self._places(speeds)[None])[0])
 
     def skill(self, speeds: Array) -> Skill:
-        """Torques at given speeds (m,), and how long their flights last.
+        """Interpolate the torques at speeds (m,), with the flight durations that they fit.
 
-        A flight lasts as long as that of the nearest practised speed, the lower of two: a torque
+        A flight lasts as long as that of the nearest learned speed, the lower of two: a torque
         was learned for its touchdown, which comes at a whole tick, so that a mean of two would be
         between those that occur.
 
@@ -104,12 +104,12 @@ class TorqueLibrary:
         return Skill(self.at(speeds), self.flight[nearest])
 
     def reusable(self, speeds: Array) -> BoolArray:
-        """Whether the skill at given speeds may be replayed without practice, shape (m,).
+        """Whether the torques at speeds (m,) may be replayed without learning, shape (m,).
 
-        That is so where the practised speeds around it landed alike (`LANDS_ALIKE`). A tick is
+        That is so where the learned speeds around it landed alike (`LANDS_ALIKE`). A tick is
         0.02 rad of swing: torques of two that did not were learned for stances that begin
-        elsewhere, and their mean fits neither. It says nothing of worlds other than that of the
-        practice.
+        elsewhere, and their mean fits neither. It says nothing of scenarios other than that of the
+        learning.
 
         Raises:
             SpeedOutOfRange: The library does not cover a speed.
@@ -121,8 +121,8 @@ class TorqueLibrary:
 
     def _places(self, speeds: Array) -> Array:
         """Fractional indices of speeds into those of the library, shape (m,)."""
-        wanted, lowest, highest = np.atleast_1d(speeds), self.speeds[0], self.speeds[-1]
-        for speed in wanted:
+        queries, lowest, highest = np.atleast_1d(speeds), self.speeds[0], self.speeds[-1]
+        for speed in queries:
             if not lowest - 1e-9 <= speed <= highest + 1e-9:
                 raise SpeedOutOfRange(
                     float(speed),
@@ -131,28 +131,28 @@ class TorqueLibrary:
                     library="torque library",
                     remedy="practise at speeds around it",
                 )
-        return np.interp(wanted, self.speeds, np.arange(len(self.speeds)))
+        return np.interp(queries, self.speeds, np.arange(len(self.speeds)))
 
     def without(self, speed: float) -> TorqueLibrary:
-        """The library as if the practised speed next to the given one had not been practised."""
-        rest = np.arange(len(self.speeds)) != int(np.argmin(np.abs(self.speeds - speed)))
+        """The library without the learned speed nearest to the given one."""
+        kept = np.arange(len(self.speeds)) != int(np.argmin(np.abs(self.speeds - speed)))
         return TorqueLibrary(
-            self.speeds[rest], self.torque[rest], self.spread[rest], self.flight[rest]
+            self.speeds[kept], self.torque[kept], self.spread[kept], self.flight[kept]
         )
 
     def left_out(self, speeds: Array) -> tuple[Skill, BoolArray]:
-        """Skills at practised speeds (m,) as if each had not been practised, from its neighbours.
+        """Initial feedforward at learned speeds (m,), each interpolated from its neighbours only.
 
         Returns:
-            The skills, and which of them are `reusable`, shape (m,).
+            The feedforward, and which of it is `reusable`, shape (m,).
 
         Raises:
             SpeedOutOfRange: A speed is the first or the last, or the library does not cover it.
         """
-        rest = [(self.without(speed), np.array([speed])) for speed in speeds]
-        skills = [library.skill(speed) for library, speed in rest]
+        reduced = [(self.without(speed), np.array([speed])) for speed in speeds]
+        skills = [library.skill(speed) for library, speed in reduced]
         torque, flight = (np.concatenate(parts) for parts in zip(*skills, strict=True))
-        reusable = [library.reusable(speed) for library, speed in rest]
+        reusable = [library.reusable(speed) for library, speed in reduced]
         return Skill(torque, flight), np.concatenate(reusable)
 
     def save(self, path: Path | str) -> None:

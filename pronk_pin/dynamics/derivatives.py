@@ -121,7 +121,7 @@ def stance_derivatives(
 
 
 def _of_motors(robot: Robot, v: Array, by_v: Array, by_force: Array) -> tuple[Array, Array]:
-    """Derivatives by v and by the motors' torques, of what depends on the joints' torques."""
+    """Derivatives by v and motor torques, by chain rule from those by v and joint torques."""
     if robot.parameters.ideal_motors:
         return by_v, by_force
     by_v = by_v.copy()
@@ -146,8 +146,8 @@ def _implicit(
     right = np.hstack([-r_q, -r_v, motors])  # (18, 48)
     free = np.linalg.solve(pin.crba(robot.model, robot.data, q), right)
     jacobian = jacobian_at(robot, q, legs, radius)
-    wanted = np.hstack([-c_q, -c_v, np.zeros((len(lam), robot.nu))]) - jacobian @ free
-    response = contact_response(robot, q, jacobian, wanted)
+    target = np.hstack([-c_q, -c_v, np.zeros((len(lam), robot.nu))]) - jacobian @ free
+    response = contact_response(robot, q, jacobian, target)
     parts = [nv, 2 * nv]
     a_q, a_v, a_tau = np.hsplit(free + response.motion, parts)
     lam_q, lam_v, lam_tau = np.hsplit(response.lam, parts)
@@ -161,7 +161,7 @@ def partials(
     legs: Sequence[int],
     radius: float,
 ) -> tuple[Array, Array, Array, Array]:
-    """r_q, r_v (18, 18) and c_q, c_v (3 feet, 18) of `_implicit`, at a motion (q, v, a)."""
+    """Partial derivatives r_q, r_v (18, 18), c_q, c_v (3 feet, 18) of `_implicit` at (q, v, a)."""
     model, data = robot.model, robot.data
     lever = np.array([0.0, 0.0, -radius])
     pin.computeForwardKinematicsDerivatives(model, data, *motion)

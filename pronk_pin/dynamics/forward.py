@@ -27,7 +27,7 @@ from .terms import mass_matrix, nonlinear_effects, quick_result, selection_matri
 
 
 class StanceDae(NamedTuple):
-    """The linear equations of stance, eq. (5): matrix [a, lam] = rhs."""
+    """Linear equations of stance, eq. (5): matrix [a, lam] = rhs."""
 
     matrix: Array
     """[[M, -J^T], [J, 0]], shape (18 + 3 feet, 18 + 3 feet)."""
@@ -115,10 +115,10 @@ def stance_dynamics(
     if simple:
         singular = point_stance(robot, legs).solve_all(*states, out=(a, lam))
     for row in np.flatnonzero(singular):
-        one = stance_accelerations(
+        solution = stance_accelerations(
             robot, (states[0][row], states[1][row], states[2][row]), legs, radius, gains
         )
-        a[row], lam[row], singular[row] = one
+        a[row], lam[row], singular[row] = solution
     return StanceDynamics(
         a.reshape(v.shape), lam.reshape(*batch, 3 * len(legs)), singular.reshape(batch)
     )
@@ -133,7 +133,7 @@ def stance_dae(
     feet: Iterable[str] | None = None,
     contact: Contact = "point",
 ) -> StanceDae:
-    """The matrix and right-hand side of eq. (5).
+    """Assemble the matrix and right-hand side of eq. (5).
 
     Arguments and errors are those of `stance_dynamics`, for one state.
     """
@@ -188,6 +188,6 @@ def impact(
     q, v = as_state(robot, q, v)
     as_one("q", q)
     jacobian = jacobian_at(robot, q, legs, radius)
-    wanted = -(1.0 + restitution) * (jacobian @ v)
-    impulse, change, singular = contact_response(robot, q, jacobian, wanted)
+    target = -(1.0 + restitution) * (jacobian @ v)
+    impulse, change, singular = contact_response(robot, q, jacobian, target)
     return Impact(v + change, impulse, singular)

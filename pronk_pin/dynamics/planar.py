@@ -87,7 +87,7 @@ def planar_dynamics(
 
 
 class Rotors(NamedTuple):
-    """What a joint adds to the URDF's dynamics, the same for all joints."""
+    """Rotor inertia and viscous friction of a joint beyond the URDF, the same for all joints."""
 
     armature: float = 0.0
     """Rotor inertia as the joint feels it [kg m^2]."""
@@ -100,7 +100,7 @@ NO_ROTORS = Rotors()
 
 
 class PlanarDerivatives(NamedTuple):
-    """Derivatives of the guided robot's acceleration at one state."""
+    """Derivatives of the planar robot's acceleration at one state."""
 
     a: Array
     """The acceleration of x, z and the joints, shape (14,)."""
@@ -121,20 +121,20 @@ def planar_derivatives(
     contact: Contact | None = None,
     rotors: Rotors = NO_ROTORS,
 ) -> PlanarDerivatives:
-    """Eq. (5), or (2) in flight, solved on the guided rows and differentiated as a whole.
+    """Solve eq. (5), or (2) in flight, on the planar rows, and differentiate it as a whole.
 
     With r(q, v, a, lam) = M a + H v + G - J^T lam and c(q, v, a) the contact points' acceleration,
-    on the rows and columns that the guide leaves free,
+    on the rows and columns that the planar constraint leaves free,
 
         M da - J^T dlam = S dtau - r_q dq - r_v dv,    J da = -c_q dq - c_v dv.
 
     Args:
         robot: The robot.
         q: Configuration with a level trunk, shape (19,).
-        v: Velocity, shape (18,), zero where the guide holds the trunk.
+        v: Velocity, shape (18,), zero where the constraint holds the trunk.
         tau: Motor torques [N m], shape (12,).
-        contact: How all the feet stand on the ground; None in flight.
-        rotors: What the joints add to the URDF.
+        contact: Contact model of the feet, which all stand; None in flight.
+        rotors: Rotor inertia and friction of the joints beyond the URDF.
     """
     rows = planar_rows(robot)
     free = len(rows)
@@ -164,7 +164,7 @@ def planar_acceleration(
     contact: Contact | None = None,
     rotors: Rotors = NO_ROTORS,
 ) -> tuple[Array, float]:
-    """The acceleration alone, shape (14,), and the force of the ground, up, on all feet [N].
+    """Acceleration of the planar coordinates, shape (14,), and vertical force on all feet [N].
 
     Arguments of `planar_derivatives`.
     """
@@ -176,7 +176,10 @@ def planar_acceleration(
 def planar_impact(
     robot: Robot, q: Array, v: Array, *, contact: Contact, rotors: Rotors = NO_ROTORS
 ) -> Array:
-    """Rates (m, 14) after a plastic impact of all feet, from rates (m, 14) before it."""
+    """Rates (m, 14) after a plastic impact of all feet, from rates (m, 14) before it.
+
+    `v+ = v - M^-1 J^T (J M^-1 J^T)^-1 J v` on the planar rows, so that `J v+ = 0`.
+    """
     rows = planar_rows(robot)
     mass = _mass(robot, q, rotors)
     jacobian = contact_jacobian(robot, q, contact=contact)[:, rows]

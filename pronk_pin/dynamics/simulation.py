@@ -82,7 +82,7 @@ class PhaseSimulation:
 
 @dataclass(frozen=True, eq=False)
 class _PhaseProblem:
-    """What is integrated, all of it checked.
+    """The checked problem of one integration.
 
     Attributes:
         robot: The robot.

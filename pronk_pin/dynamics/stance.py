@@ -1,6 +1,7 @@
-"""Contact forces that keep feet at rest: Pinocchio's solver, and a dense one for singular stances.
+"""Stance dynamics: contact forces that keep feet at rest, also in singular stances.
 
-Both are written for one checked state, with the legs by index.
+By Pinocchio's solver, and a dense one for singular stances; both for one checked state, with the
+legs by index.
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ _REGULAR, _SINGULAR_STANCE = np.bool_(False), np.bool_(True)
 
 
 class Baumgarte(NamedTuple):
-    """Gains that pull drifting feet back: c_ddot = -kd c_dot - kp (height of foot - its radius) z.
+    """Baumgarte gains, which pull drifting feet back: `c_ddot = -kd c_dot - kp (h - radius) e_z`.
 
-    Sideways there is no place to return to, only a velocity to lose.
+    h is the height of the foot's centre. Sideways there is no place to return to, only a velocity
+    to lose.
     """
 
     kp: float
@@ -46,7 +48,7 @@ NO_GAINS = Baumgarte(0.0, 0.0)
 
 
 def baumgarte_gains(baumgarte: tuple[float, float] | None) -> Baumgarte:
-    """Gains as a user gives them.
+    """Check the gains that a user gives.
 
     Raises:
         InvalidInput: Not two numbers, or negative ones.
@@ -72,7 +74,7 @@ class StanceDynamics(NamedTuple):
 
 
 class Impact(NamedTuple):
-    """What a collision of feet with the ground does."""
+    """Result of a collision of feet with the ground."""
 
     v: Array
     """Velocity after the impact, shape (18,)."""
@@ -83,7 +85,7 @@ class Impact(NamedTuple):
 
 
 class Response(NamedTuple):
-    """What contact forces or impulses do to the feet."""
+    """Contact forces or impulses, and their effect on the motion."""
 
     lam: Array
     """Forces or impulses, shape (3 feet,)."""
@@ -129,7 +131,7 @@ class PointStance:
         self._force = np.zeros(robot.nv)
 
     def solve(self, q: Array, v: Array, tau: Array) -> StanceDynamics:
-        """Accelerations under motor torques (12,); `singular` is a suspicion only."""
+        """Compute accelerations under motor torques (12,); `singular` is a suspicion only."""
         self._force[NB:] = tau
         a = pin.constraintDynamics(
             self._model,
@@ -144,19 +146,19 @@ class PointStance:
         return StanceDynamics(a, self._lam.copy(), self._suspicious())
 
     def quick(self, q: Any, v: Any, tau: Array) -> StanceDynamics | None:
-        """Accelerations of an unchecked state, or None where anything looks odd."""
+        """Compute accelerations of an unchecked state, or None where anything looks odd."""
         try:
             if sound_base(q) and v.ndim == 1:
-                one = self.solve(q, v, tau)
+                solution = self.solve(q, v, tau)
                 # NaN in any joint, velocity or torque shows in the base's acceleration.
-                if not one.singular and isfinite(one.a.item(0)):
-                    return one
+                if not solution.singular and isfinite(solution.a.item(0)):
+                    return solution
         except REFUSALS:
             pass
         return None
 
     def solve_all(self, q: Array, v: Array, tau: Array, out: tuple[Array, Array]) -> BoolArray:
-        """Accelerations of n states into arrays (n, 18) and (n, 3 feet); which are suspicious."""
+        """Write accelerations and forces of n states into `out`; return which are suspicious."""
         force = np.zeros_like(v)
         force[:, NB:] = tau
         pivots = np.empty((len(q), self._size))
@@ -171,7 +173,7 @@ class PointStance:
         return np.asarray(~(pivots.max(axis=1) < _SUSPECT * pivots.min(axis=1)))
 
     def quick_impact(self, q: Any, v: Any, restitution: float) -> Impact | None:
-        """Velocity and impulses of an unchecked state, or None where anything looks odd."""
+        """Compute velocity and impulses of an unchecked state, or None where anything looks odd."""
         try:
             if sound_base(q) and v.ndim == 1:
                 after = self._impact(q, v, restitution)
@@ -195,7 +197,7 @@ class PointStance:
         return Impact(after, self._data.impulse_c.copy(), self._suspicious())
 
     def derivatives(self) -> tuple[Array, Array, Array, Array, Array, Array]:
-        """Of a and lam by q, v and tau: six blocks, of the state solved last."""
+        """Derivatives of a and lam by q, v and tau: six blocks, of the state solved last."""
         blocks = pin.computeConstraintDynamicsDerivatives(
             self._model, self._data, self._contacts, self._forces, self._settings
         )
@@ -233,18 +235,20 @@ def stance_accelerations(
     if gains.kp:
         target[2::3] -= gains.kp * (foot_positions(robot, q)[list(legs), 2] - robot.foot_radius)
     free = pin.aba(robot.model, robot.data, q, v, np.concatenate([np.zeros(NB), tau]))
-    wanted = target - bias_at(robot, q, v, legs, radius) - jacobian @ free
-    lam, motion, singular = contact_response(robot, q, jacobian, wanted)
+    residual = target - bias_at(robot, q, v, legs, radius) - jacobian @ free
+    lam, motion, singular = contact_response(robot, q, jacobian, residual)
     return StanceDynamics(free + motion, lam, singular)
 
 
-def contact_response(robot: Robot, q: Array, jacobian: Array, wanted: Array) -> Response:
-    """Forces that change the contact points' acceleration (or velocity) by `wanted`.
+def contact_response(robot: Robot, q: Array, jacobian: Array, target: Array) -> Response:
+    """Solve `J M^-1 J^T lam = wanted` for forces that change the contacts' acceleration.
 
-    `wanted` and the response have shape (3 feet,), or (3 feet, n) for n of them at once.
+    Or for impulses that change their velocity.
+
+    `target` and the response have shape (3 feet,), or (3 feet, n) for n of them at once.
 
     Directions in which the contacts cannot move, or push against each other, get the damped
-    least-squares answer of J M^-1 J^T lam = wanted; all others the exact one.
+    least-squares solution; all others the exact one.
     """
     mass = pin.crba(robot.model, robot.data, q)
     spread = scipy.linalg.solve(mass, jacobian.T, assume_a="pos", check_finite=False)
@@ -253,7 +257,7 @@ def contact_response(robot: Robot, q: Array, jacobian: Array, wanted: Array) -> 
         factor = scipy.linalg.cholesky(delassus, lower=True, check_finite=False)
         pivots = factor.diagonal()
         if pivots.min(initial=np.inf) ** 2 > _SUSPECT * pivots.max(initial=0.0) ** 2:
-            lam = scipy.linalg.cho_solve((factor, True), wanted, check_finite=False)
+            lam = scipy.linalg.cho_solve((factor, True), target, check_finite=False)
             return Response(lam, spread @ lam, _REGULAR)
     except np.linalg.LinAlgError:
         pass
@@ -265,5 +269,5 @@ def contact_response(robot: Robot, q: Array, jacobian: Array, wanted: Array) -> 
         values / (values**2 + (_DAMPING * largest) ** 2 + np.finfo(float).tiny),
         1.0 / np.where(weak, 1.0, values),
     )
-    lam = (vectors * gains) @ (vectors.T @ wanted)
+    lam = (vectors * gains) @ (vectors.T @ target)
     return Response(lam, spread @ lam, np.bool_(weak.any()))

@@ -26,7 +26,7 @@ _COUPLING = 4
 def quick_result(
     algorithm: Callable[..., Any], robot: Robot, probe: int, q: Any, v: Any = None, *others: Any
 ) -> Array | None:
-    """What an algorithm of Pinocchio says of a state, or None where anything looks odd.
+    """Result of an algorithm of Pinocchio for a state, or None where anything looks odd.
 
     Args:
         algorithm: Called with model, data, q, v if given, and the others.

@@ -1,4 +1,4 @@
-"""What the robot should do: optimal gaits, their Bezier form, and the library."""
+"""Gaits: optimal periodic motions, their Bezier form, and the gait library."""
 
 from .audit import BezierLoss, audit, bezier_orders
 from .build import build_library

@@ -1,4 +1,4 @@
-"""Is a gait right? Each claim about a solution, checked by other means than the solver's.
+"""Audit of gait solutions: each claim checked by other means than the solver's.
 
 The named constraints are evaluated on the collocation's own expressions. Everything else is seen
 with Pinocchio's model of the whole robot, which the optimisation never touched, and by solving once
@@ -62,7 +62,7 @@ def audit(solution: GaitSolution, *, refine: bool = True) -> Audit:
 
 
 class BezierLoss(NamedTuple):
-    """What Bezier polynomials of one order lose against the optimised motion of a phase."""
+    """Errors of Bezier polynomials of one order against the optimised motion of a phase."""
 
     order: int
     joints: float
@@ -72,11 +72,11 @@ class BezierLoss(NamedTuple):
 
 
 def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
-    """Why a phase has its Bezier order: what each order loses, by phase.
+    """Errors of the Bezier form by order, for each phase; they justify the orders in use.
 
     The errors are those at the nodes of the mesh, midpoints included.
     """
-    robot, found = solution.problem.robot, {}
+    robot, losses_by_phase = solution.problem.robot, {}
     for phase, motion in _phases(solution):
         losses, feet = [], _feet(robot, motion)
         s = motion.t / motion.t[-1]
@@ -86,8 +86,8 @@ def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
             joints = float(np.max(np.abs(q - motion.q)[:, NB + 1 :]))
             height = foot_positions(robot, q)[..., 2] - feet[..., 2]
             losses.append(BezierLoss(order, joints, float(np.max(np.abs(height)))))
-        found[phase.name] = tuple(losses)
-    return found
+        losses_by_phase[phase.name] = tuple(losses)
+    return losses_by_phase
 
 
 def _phases(solution: GaitSolution) -> Iterator[tuple[ContactPhase, Motion]]:
@@ -105,12 +105,12 @@ def _stances(solution: GaitSolution) -> Iterator[tuple[str, Motion, list[int]]]:
 
 def _worst(name: str, by_phase: Mapping[str, tuple[Motion, Array]]) -> Check:
     """The worst of values (nodes, ...) over the phases, with its place."""
-    found = []
+    candidates = []
     for phase, (motion, values) in by_phase.items():
         by_node = np.abs(values).reshape(len(motion.t), -1).max(axis=1)
         k = int(np.argmax(by_node))
-        found.append((float(by_node[k]), _place(phase, motion.t[k])))
-    value, where = max(found)
+        candidates.append((float(by_node[k]), _place(phase, motion.t[k])))
+    value, where = max(candidates)
     return Check.of(name, value, where)
 
 
@@ -119,8 +119,8 @@ def _place(phase: str, time: float) -> str:
 
 
 def _residual(solution: GaitSolution) -> tuple[Check, Check]:
-    """Equations of motion (2) of the whole robot: in the rows that the guide leaves free nothing
-    must be missing; in the others, what the guide carries."""
+    """Residual of eq. (2) of the whole robot: zero on the planar rows, which the planar constraint
+    leaves free; on the others the constraint's forces."""
     robot, contact = solution.problem.robot, solution.problem.contact
     rows, free, guide = planar_rows(robot, solution.problem.base), {}, {}
     for name, motion in solution.motions.items():
@@ -131,7 +131,7 @@ def _residual(solution: GaitSolution) -> tuple[Check, Check]:
 
 
 def _symmetry(solution: GaitSolution) -> Check:
-    """Bilateral symmetry, seen where it matters: the feet stand mirrored in the world."""
+    """Bilateral symmetry: distance of the right feet from the mirror image of the left ones [m]."""
     robot = solution.problem.robot
     left = [i for i, leg in enumerate(robot.legs) if leg.endswith("L")]
     right = [i for i, leg in enumerate(robot.legs) if leg.endswith("R")]
@@ -144,8 +144,8 @@ def _symmetry(solution: GaitSolution) -> Check:
 
 
 def _apex(solution: GaitSolution) -> Check:
-    """The trunk's greatest height in flight, between the nodes too, or, with several flights, its
-    height in the middle of each."""
+    """Error of the apex [m]: the trunk's greatest height in flight, between the nodes too, or, with
+    several flights, its height in the middle of each."""
     flights, errors = [phase for phase in solution.gait.phases if not phase.feet], []
     for phase in flights:
         height = phase.base_reference(np.linspace(0.0, 1.0, 1001))[0][:, 1]
@@ -193,9 +193,9 @@ def _drifts(solution: GaitSolution) -> tuple[_PhaseDrift, _PhaseDrift]:
     }
 
     def worst(standing: bool) -> _PhaseDrift:
-        mine = {phase.name: d for phase, d in drifts.items() if bool(phase.stands) == standing}
-        joints = max((d.joints.value, _place(name, d.joints.time)) for name, d in mine.items())
-        feet = max((d.feet.value, _place(name, d.feet.time)) for name, d in mine.items())
+        group = {phase.name: d for phase, d in drifts.items() if bool(phase.stands) == standing}
+        joints = max((d.joints.value, _place(name, d.joints.time)) for name, d in group.items())
+        feet = max((d.feet.value, _place(name, d.feet.time)) for name, d in group.items())
         return _PhaseDrift(*joints, *feet)
 
     return worst(True), worst(False)
@@ -213,20 +213,20 @@ def _order(solution: GaitSolution, fine: float) -> Check:
         if ratio == 1.0:
             break
         try:
-            found = optimize_gait(
+            coarse_solution = optimize_gait(
                 solution.problem.remeshed(coarse),
                 initial=resampled(solution, coarse),
                 diagnose=False,
             )
         except GaitNotFound:
             continue
-        order = float(np.log(_drifts(found)[0].joints / fine) / np.log(ratio))
+        order = float(np.log(_drifts(coarse_solution)[0].joints / fine) / np.log(ratio))
         return Check.of(name, order, f"stance drift, from {coarse} intervals to {intervals}")
     return Check.of(name, 0.0, "no gait on a coarser mesh to compare with")
 
 
 def _bezier(solution: GaitSolution) -> tuple[Check, ...]:
-    """What the Bezier form loses against the optimised motion."""
+    """Errors of the Bezier form against the optimised motion."""
     position, velocity, torque = {}, {}, {}
     for phase in solution.gait.phases:
         motion = solution.motions[phase.name]
@@ -243,7 +243,7 @@ def _bezier(solution: GaitSolution) -> tuple[Check, ...]:
 
 
 def _use(solution: GaitSolution) -> tuple[Check, ...]:
-    """How much of each limit the gait uses, and the force of the ground."""
+    """Share of each limit that the gait uses, and the total ground force [N]."""
     robot, motions = solution.problem.robot, solution.motions
     cone, total = {}, {}
     for name, motion, legs in _stances(solution):

@@ -1,4 +1,4 @@
-"""Bezier polynomials over the phase: eq. (7) of the paper.
+"""Bezier polynomials over the phase: `B(s) = sum_i c_i C(n, i) s^i (1 - s)^(n - i)`, eq. (7).
 
 Coefficients stand in the last axis: `(..., order + 1)`. The phase `s` runs from 0 to 1.
 """
@@ -12,14 +12,14 @@ from .._typing import Array
 
 
 def bernstein(s: Array, order: int) -> Array:
-    """Bernstein polynomials of an order at the phases s, shape (len(s), order + 1)."""
+    """Evaluate the Bernstein polynomials of an order at the phases s, (len(s), order + 1)."""
     s = np.atleast_1d(np.asarray(s, dtype=float))
     rising, falling = np.vander(s, order + 1, increasing=True), np.vander(1.0 - s, order + 1)
     return np.asarray(comb(order, np.arange(order + 1)) * rising * falling)
 
 
 def evaluate(coefficients: Array, s: Array, *, derivative: int = 0) -> Array:
-    """Values, or derivatives by s, at the phases s.
+    """Evaluate Bezier polynomials, or their derivatives by s, at the phases s.
 
     Args:
         coefficients: Bezier coefficients, shape (..., order + 1).
@@ -36,7 +36,7 @@ def evaluate(coefficients: Array, s: Array, *, derivative: int = 0) -> Array:
 
 
 def differentiate(coefficients: Array) -> Array:
-    """Coefficients of the derivative by s, one order lower."""
+    """Coefficients of the derivative by s, one order lower: `n (c_{i+1} - c_i)`."""
     order = coefficients.shape[-1] - 1
     if order == 0:
         return np.zeros_like(coefficients)
@@ -51,7 +51,7 @@ def fit(
     rates: Array | None = None,
     pinned: int = 0,
 ) -> Array:
-    """Least-squares coefficients through samples.
+    """Fit Bezier coefficients to samples by least squares.
 
     Args:
         s: Phases of the samples, from 0 to 1, shape (n,).
@@ -73,17 +73,17 @@ def fit(
         flat_rates = rates.reshape(len(s), -1)
         basis, target = np.vstack([basis, slope]), np.vstack([target, flat_rates])
     coefficients = np.zeros((order + 1, flat.shape[1]))
-    known: list[int] = []
+    fixed: list[int] = []
     if pinned >= 1:
         coefficients[0], coefficients[-1] = flat[0], flat[-1]
-        known += [0, order]
+        fixed += [0, order]
     if pinned >= 2:
         if rates is None:
             raise ValueError("pinned=2 needs the rates")
         coefficients[1] = coefficients[0] + flat_rates[0] / order
         coefficients[-2] = coefficients[-1] - flat_rates[-1] / order
-        known += [1, order - 1]
-    free = [i for i in range(order + 1) if i not in known]
+        fixed += [1, order - 1]
+    free = [i for i in range(order + 1) if i not in fixed]
     remainder = target - basis @ coefficients
     coefficients[free] = np.linalg.lstsq(basis[:, free], remainder, rcond=None)[0]
     return np.asarray(coefficients.T.reshape(*shape, order + 1))

@@ -49,7 +49,7 @@ Key = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """What the file of one gait holds: a library of one, and what a warm start needs."""
+    """Contents of the file of one gait: a library of one, and the state for a warm start."""
 
     library: GaitLibrary
     state: SolverState
@@ -139,18 +139,20 @@ def _folder(folder: Path | str | None) -> Iterator[Path]:
         yield Path(temporary)
 
 
-def _home(apexes: Sequence[float] | Array, wanted: float) -> float:
-    """The apex that a build begins at."""
-    return float(min(apexes, key=lambda apex: (abs(apex - wanted), apex)))
+def _home(apexes: Sequence[float] | Array, desired: float) -> float:
+    """The apex at which a build begins."""
+    return float(min(apexes, key=lambda apex: (abs(apex - desired), apex)))
 
 
 def _outward(
-    speeds: Sequence[float] | Array, apexes: Sequence[float] | Array, wanted: float
+    speeds: Sequence[float] | Array, apexes: Sequence[float] | Array, desired: float
 ) -> dict[Key, Key | None]:
-    """Each gait once, with the neighbour that it starts from: along the speeds at the home apex,
-    then along the heights. Neighbours come before those that start from them."""
+    """Order of continuation: each gait with the neighbour that it starts from, or None.
+
+    Along the speeds at the home apex, then along the heights; neighbours come first.
+    """
     rows = sorted({float(speed) + 0.0 for speed in speeds}, key=lambda v: (abs(v), v))
-    home = _home(apexes, wanted)
+    home = _home(apexes, desired)
     columns = sorted({float(apex) for apex in apexes}, key=lambda h: (abs(h - home), h))
     parents: dict[Key, Key | None] = {}
     for apex in columns:
@@ -173,7 +175,7 @@ def _solve_all(
     *,
     keeps: bool,
 ) -> None:
-    """Solve what has no file yet; what is there is checked first, so that damage is named early."""
+    """Solve the gaits without a file; the others' files are checked first, for early errors."""
     done = {key for key, task in tasks.items() if task.path.exists()}
     for key in done:
         _read(tasks[key])
@@ -275,7 +277,7 @@ def _work(task: _Task, start: Path | None) -> None:
     """Solve and audit one gait, and write its file."""
     began = time.perf_counter()
     solution = _solve(task.problem, None if start is None else _read(_Task(task.problem, start)))
-    found = audit(solution)
+    audit_result = audit(solution)
     metadata = {
         "problem": task.problem.options(),
         "cost": [solution.cost],
@@ -288,14 +290,14 @@ def _work(task: _Task, start: Path | None) -> None:
         },
     }
     state = solution.state
-    arrays = to_arrays(GaitLibrary((solution.gait,), metadata, (found,)))
+    arrays = to_arrays(GaitLibrary((solution.gait,), metadata, (audit_result,)))
     arrays |= {"x": state.x, "lam_x": state.lam_x, "lam_g": state.lam_g}
     arrays["fingerprint"] = np.array(task.problem.fingerprint())
     write_arrays(task.path, arrays)
 
 
 def _solve(problem: GaitProblem, neighbour: _Solved | None) -> GaitSolution:
-    """Start from the solved neighbour; where there is none, or that fails, from the crude guess."""
+    """Solve from the neighbour's solution; where there is none, or that fails, from the guess."""
     if neighbour is not None:
         try:
             return optimize_gait(problem, initial=neighbour.state, diagnose=False)
@@ -357,5 +359,5 @@ def _library(
 
 
 def _worst_orders(each: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """What Bezier polynomials of each order lose, the worst over the gaits."""
+    """Errors of Bezier polynomials of each order, the worst over the gaits."""
     return {name: np.max([orders[name] for orders in each], axis=0).tolist() for name in each[0]}

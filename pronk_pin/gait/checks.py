@@ -1,4 +1,4 @@
-"""What an audit says: named checks with their worst values, places and limits."""
+"""Checks of an audit, with their worst values, places and limits."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ UNITS = {
 
 
 class Limit(NamedTuple):
-    """What a check measures, and what passes; None where the value only informs."""
+    """Unit and bounds of a check; None where the value only informs."""
 
     unit: str
     most: float | None = None
@@ -121,7 +121,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Audit:
-    """What was found about one gait.
+    """Result of the audit of one gait.
 
     Attributes:
         speed: Speed of the gait [m/s].
@@ -145,7 +145,7 @@ class Audit:
 
     @property
     def failures(self) -> tuple[Check, ...]:
-        """What is not within its limit."""
+        """The checks that are not within their limit."""
         return tuple(check for check in (*self.constraints, *self.checks) if not check.passed)
 
     def __getitem__(self, name: str) -> Check:
@@ -178,6 +178,6 @@ class Audit:
         return cls(speed, tuple(constraints), tuple(checks))
 
     def table(self) -> str:
-        """Everything that was found, one line a check."""
+        """The audit as text, one line a check."""
         header = f"{'check':<24}{'worst':>10}  {'unit':<12}{'passes':>9}  where"
         return "\n".join([header, *(c.line() for c in (*self.constraints, *self.checks))])

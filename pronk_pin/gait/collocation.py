@@ -172,7 +172,7 @@ def _feet(
 
 
 def _standing(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> list[Constraint]:
-    """Holonomic constraints (3) of the standing feet, and the friction cone."""
+    """Holonomic constraints (3) of the standing feet, `J a + sigma = 0`, and the friction cone."""
     constraints = []
     for k in range(len(phase.s) if phase.legs else 0):
         where = f"{phase.name}, node {k}"
@@ -186,7 +186,7 @@ def _standing(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> list[C
 def _swinging(
     problem: GaitProblem, model: FoldedModel, phases: Sequence[_Phase], leg: int
 ) -> list[Constraint]:
-    """Clearance of a foot over its swings (unilateral constraints in flight).
+    """Clearance of a foot over its swings: `z >= 16 h s^2 (1 - s)^2` at the phase s of the swing.
 
     A swing goes from lift-off to touchdown, through as many phases as it takes.
     """
@@ -214,7 +214,7 @@ def _swinging(
 
 
 def _apex(s: Array, z: ca.SX) -> ca.SX:
-    """Top of the trunk's path from its heights alone, around the middle of flight.
+    """Greatest height of the trunk, by interpolation of its heights in mid-flight.
 
     A parabola's vertex gives the phase, a quartic the height there. Heights alone, because a
     condition on the velocity or the acceleration of one node makes the legs kink at it.
@@ -230,7 +230,7 @@ def _apex(s: Array, z: ca.SX) -> ca.SX:
 
 
 def _stride(problem: GaitProblem, phases: Sequence[_Phase], speed: ca.SX) -> list[Constraint]:
-    """What the stride as a whole must be: its duration, its speed, where it begins."""
+    """Constraints on the whole stride: duration, start at x = 0, `x_N - x_0 = v T`."""
     total = sum((phase.duration for phase in phases), ca.SX(0))
     first, last = phases[0].q[0, 0], phases[-1].q[0, -1]
     return [
@@ -247,9 +247,10 @@ def _transition(
     phases: Sequence[_Phase],
     index: int,
 ) -> list[Constraint]:
-    """What leads into a phase: the motion goes on, but for the impact of the feet that land.
+    """Transition into a phase: continuity, or the plastic impact of the feet that land.
 
-    The impact is plastic: the impulses stop all standing feet, and lie in the friction cone.
+    `M (v+ - v-) = J^T impulse` with `J v+ = 0` for all standing feet, and impulses within the
+    friction cone.
     """
     phase, before = phases[index], phases[index - 1]
     name, rows = ("phase continuity", slice(0, None)) if index else ("periodicity", slice(1, None))
@@ -284,7 +285,10 @@ def _cone(forces: ca.SX, legs: Sequence[int], friction: float) -> ca.SX:
 
 
 def _cost(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> ca.SX:
-    """Cost (6) over a phase, by Simpson's rule; the kept legs count twice."""
+    """Cost (6) over a phase, `int W_tau |tau|^2 + W_q |q'|^2 dt`, by Simpson's rule.
+
+    The kept legs count twice.
+    """
     rate = 2.0 * (
         problem.torque_weight * ca.sum1(phase.tau**2)
         + problem.velocity_weight * ca.sum1(phase.v[model.nb :, :] ** 2)

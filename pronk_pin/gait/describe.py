@@ -1,4 +1,4 @@
-"""A gait library in words: one line for each gait, or one gait in detail."""
+"""Text of a gait library for a terminal: one line for each gait, or one gait in detail."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .library import GaitLibrary, known_library
 
 
 def describe_library(library: GaitLibrary) -> str:
-    """A table of the gaits and of what their audit found.
+    """Format the gaits and their audits as a table.
 
     Raises:
         InvalidInput: The library has no audit.
@@ -26,15 +26,15 @@ def describe_library(library: GaitLibrary) -> str:
         "    m/s      m       s     (worst)       N, N m           rad         m           rad"
         "              rad  of lim.   of lim.   of lim.",
     ]
-    for gait, found in zip(library.gaits, library.audit, strict=True):
+    for gait, result in zip(library.gaits, library.audit, strict=True):
         lines.append(
             f"{gait.speed:>+7.2f}{gait.apex:>7.3f}{gait.duration:>8.3f}"
-            f"{found.worst_violation.value:>11.1e}{found['18-DoF residual'].value:>13.1e}"
-            f"{found['stance drift'].value:>14.1e}{found['stance foot drift'].value:>10.1e}"
-            f"{found['flight drift'].value:>14.1e}{found['convergence order'].value:>7.1f}"
-            f"{found['bezier position'].value:>10.1e}{found['torque use'].value:>8.0%}"
-            f"{found['velocity use'].value:>10.0%}{found['friction use'].value:>10.0%}"
-            + ("" if found.passed else "  FAILED: " + ", ".join(c.name for c in found.failures))
+            f"{result.worst_violation.value:>11.1e}{result['18-DoF residual'].value:>13.1e}"
+            f"{result['stance drift'].value:>14.1e}{result['stance foot drift'].value:>10.1e}"
+            f"{result['flight drift'].value:>14.1e}{result['convergence order'].value:>7.1f}"
+            f"{result['bezier position'].value:>10.1e}{result['torque use'].value:>8.0%}"
+            f"{result['velocity use'].value:>10.0%}{result['friction use'].value:>10.0%}"
+            + ("" if result.passed else "  FAILED: " + ", ".join(c.name for c in result.failures))
         )
     times = library.metadata.get("solve_time", [])
     if times:
@@ -43,8 +43,7 @@ def describe_library(library: GaitLibrary) -> str:
 
 
 def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None) -> str:
-    """One gait in detail: its form, and its audit where it is one of the library's, or what its
-    interpolation leaves out where it is not.
+    """Format one gait: its phases, residuals, and its audit if it is one of the library's.
 
     Raises:
         SpeedOutOfRange: The library does not cover the speed.
@@ -77,7 +76,7 @@ def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None)
 
 
 def _why(losses: Sequence[Any], order: int) -> str:
-    """What the order and its neighbours lose over the whole library."""
+    """Worst errors of the order and its neighbours over the whole library."""
     near = [loss for loss in losses if abs(loss[0] - order) <= 2]
     parts = [f"{int(n)}: {joints:.1e} rad, {1e3 * feet:.2g} mm" for n, joints, feet in near]
     return "worst loss of joints and feet by order, " + "; ".join(parts)

@@ -1,4 +1,4 @@
-"""Why a gait problem has no solution: its demands made elastic, its laws kept.
+"""Diagnosis of infeasible gait problems: demands made elastic, laws of motion kept.
 
 The laws of motion, contact and continuity are not negotiable; what is asked of the gait is. Each
 demand may give way by one number, in its own unit and in all its rows alike, and what gives way,
@@ -32,7 +32,7 @@ DEMANDS: Mapping[str, tuple[float, str]] = {
     "friction cone": (20.0, "raise friction"),
     "impulse cone": (1.0, "raise friction"),
 }
-"""What may give way: the size of it that counts as one, in its unit, and what to try. The demand
+"""Demands that may give way: their typical sizes, in their units, and remedies. The demand
 "average speed" is kept as a distance over the stride [m]."""
 
 _ARGUMENTS = (
@@ -65,7 +65,7 @@ NOTABLE = 0.02
 
 
 def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] | None:
-    """By how much which demands have to give way, in their units, the worst first.
+    """Find the demands that conflict, and by how much each has to give way, the worst first.
 
     Args:
         program: The program without a solution.
@@ -114,9 +114,9 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] |
             p=p,
         )
         if solver.stats()["success"]:
-            gives = np.array(result["x"]).ravel()[-len(names) :]
-            found = [i for i in np.argsort(-gives) if gives[i] > NOTABLE]
-            return {names[i]: float(gives[i] * DEMANDS[names[i]][0]) for i in found}
+            slacks = np.array(result["x"]).ravel()[-len(names) :]
+            conflicting = [i for i in np.argsort(-slacks) if slacks[i] > NOTABLE]
+            return {names[i]: float(slacks[i] * DEMANDS[names[i]][0]) for i in conflicting}
     return None
 
 

@@ -84,7 +84,7 @@ class FoldedModel:
         return self.nb + self.nl
 
     def joint_rows(self) -> IntArray:
-        """Which of the robot's joints the folded robot keeps, shape (6,)."""
+        """Indices of the robot's joints that the folded robot keeps, shape (6,)."""
         kept = np.array([self.robot.legs.index(leg) for leg in self.legs], dtype=np.intp)
         return _leg_joints(kept)
 
@@ -112,8 +112,8 @@ class FoldedModel:
         return np.asarray(folded[..., self.joint_index()] * self.joint_sign())
 
     def unfold_torques(self, mean: Array, left: Array) -> Array:
-        """Torques of the whole robot (..., 12) from the mean of left and right (..., 6) and what
-        the left motors need beyond it (..., 6)."""
+        """Torques of the whole robot (..., 12) from the mean of left and right (..., 6) and the
+        surplus of the left motors over it (..., 6)."""
         sides = np.where(np.repeat(self._right(), len(JOINTS)), -1.0, 1.0)
         return np.asarray(self.unfold_joints(mean) + sides * self.unfold_joints(left))
 
@@ -175,8 +175,10 @@ def fold(robot: Robot, contact: Contact = "rolling", base: Base = "locked") -> F
 
 
 def _of_motors(robot: Robot, legs: tuple[str, ...], forces: ca.SX, v: ca.SX) -> ca.SX:
-    """Forces along the coordinates with the joints' torques as asked of the motors, which work
-    against friction; `Robot.motor_torques` in CasADi."""
+    """Replace the joint torques among the forces by the commanded motor torques.
+
+    `Robot.motor_torques` in CasADi: friction added, over the torque constant.
+    """
     n = len(legs) * len(JOINTS)
     damping, coulomb = (
         np.tile(getattr(robot.parameters, name), len(legs)) for name in ("damping", "coulomb")

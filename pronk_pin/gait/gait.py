@@ -1,4 +1,4 @@
-"""A gait: what the robot should do over one stride, as Bezier polynomials over the phase.
+"""Gaits: periodic motions over one stride, as Bezier polynomials over the phase.
 
 A stride is a sequence of phases, each with its own set of stance feet. Pronking has two: `stance`
 on all four feet, then `flight` on none; the touchdown impact closes the cycle.
@@ -214,12 +214,13 @@ class Gait:
             return (1.0 - weight) * a + weight * b
 
         phases = []
-        for mine, theirs in zip(self.phases, other.phases, strict=True):
+        for own_phase, other_phase in zip(self.phases, other.phases, strict=True):
             mixed = {
-                name: (1.0 - weight) * getattr(mine, name) + weight * getattr(theirs, name)
+                name: (1.0 - weight) * getattr(own_phase, name)
+                + weight * getattr(other_phase, name)
                 for name in ARRAYS
             }
-            duration = mix(mine.duration, theirs.duration)
-            phases.append(GaitPhase(mine.name, mine.feet, duration, **mixed))
+            duration = mix(own_phase.duration, other_phase.duration)
+            phases.append(GaitPhase(own_phase.name, own_phase.feet, duration, **mixed))
         speed, apex = mix(self.speed, other.speed), mix(self.apex, other.apex)
         return Gait(self.robot, speed, apex, tuple(phases))

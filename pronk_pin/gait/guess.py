@@ -1,4 +1,4 @@
-"""Where the solver starts when there is no neighbour."""
+"""Initial guess of the gait optimisation where there is no neighbour."""
 
 from __future__ import annotations
 

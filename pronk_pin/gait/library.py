@@ -90,12 +90,12 @@ class GaitLibrary:
 
     @property
     def base(self) -> Base:
-        """How the trunk may move."""
+        """Base mode of the gaits: "locked" or "sagittal"."""
         base: Base = self.metadata.get("problem", {}).get("base", "locked")
         return base
 
     def index(self, speed: float, apex: float | None = None) -> int:
-        """Where in `gaits` a gait of the grid is.
+        """Index in `gaits` of a gait of the grid.
 
         Raises:
             InvalidInput: There is no such gait; the error lists the grid.
@@ -151,7 +151,7 @@ class GaitLibrary:
     def residual(
         self, speed: float, apex: float | None = None, *, robot: Robot | None = None
     ) -> GaitResidual:
-        """How nearly the gait at a speed and apex obeys the equations of motion (2).
+        """Residual of the gait at a speed and apex in the equations of motion (2).
 
         Args:
             speed: Speed [m/s].
@@ -212,14 +212,14 @@ class GaitLibrary:
 
 
 DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile)
-"""What reading a damaged `.npz` raises."""
+"""Errors that reading a damaged `.npz` raises."""
 
 PER_GAIT = ("cost", "iterations", "solve_time", "work_time")
 """Metadata with one value for each gait."""
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write an `.npz` in one go: who interrupts it leaves no half of a file.
+    """Write an `.npz` atomically.
 
     Raises:
         FileProblem: The file cannot be written.
@@ -235,7 +235,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
 
 
 def to_arrays(library: GaitLibrary) -> dict[str, Any]:
-    """A library as an `.npz` holds it."""
+    """Arrays of a library, as an `.npz` holds them."""
     arrays: dict[str, Any] = {
         "schema": np.array(SCHEMA),
         "speed": np.array([gait.speed for gait in library.gaits]),
@@ -255,7 +255,7 @@ def to_arrays(library: GaitLibrary) -> dict[str, Any]:
 
 
 def from_arrays(arrays: Mapping[str, Any]) -> GaitLibrary:
-    """Put a library together again; a missing or misshapen array raises."""
+    """Make a library from the arrays of `to_arrays`; a missing or misshapen one raises."""
     metadata = json.loads(str(arrays["metadata"]))
     names = [str(name) for name in arrays["phases"]]
     feet = [tuple(filter(None, str(names).split(","))) for names in arrays["feet"]]
@@ -281,7 +281,7 @@ def from_arrays(arrays: Mapping[str, Any]) -> GaitLibrary:
 
 
 def _check_model(path: Path, library: GaitLibrary, robot: Robot | None) -> None:
-    """The gaits were made for the URDF that is installed."""
+    """Check that the gaits were made for the URDF that is installed."""
     if robot is None and library.robot not in ROBOTS:
         return
     robot = load_robot(library.robot) if robot is None else robot
@@ -302,9 +302,9 @@ def _check_model(path: Path, library: GaitLibrary, robot: Robot | None) -> None:
 def _check_audit(path: Path, library: GaitLibrary) -> None:
     if not library.audit:
         raise FileProblem(path, "gaits without an audit", _REBUILD)
-    for gait, found in zip(library.gaits, library.audit, strict=True):
-        if not found.passed:
-            failed = ", ".join(check.name for check in found.failures)
+    for gait, result in zip(library.gaits, library.audit, strict=True):
+        if not result.passed:
+            failed = ", ".join(check.name for check in result.failures)
             raise FileProblem(
                 path,
                 f"the gait at {gait.speed:g} m/s, apex {gait.apex:g} m, fails its audit ({failed})",

@@ -22,7 +22,7 @@ BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3}
 
 
 Half = Literal["mean", "difference"]
-"""Which half of a pair of legs: their mean, or half of what the left one differs by."""
+"""Part of a pair of legs: their mean, or half their difference, left less right."""
 
 _MIRROR = {"L": "R", "R": "L"}
 
@@ -49,7 +49,7 @@ class _Inertia(NamedTuple):
     """Rotational inertia about the origin [kg m^2], shape (3, 3)."""
 
     def mean(self, other: _Inertia) -> _Inertia:
-        """Halfway to another one."""
+        """Mean with another inertia."""
         return _Inertia(
             0.5 * (self.mass + other.mass),
             0.5 * (self.first + other.first),
@@ -57,12 +57,12 @@ class _Inertia(NamedTuple):
         )
 
     def mirrored(self) -> _Inertia:
-        """Seen in the mirror y = 0."""
+        """Mirror image about the plane y = 0."""
         flip = np.array([1.0, -1.0, 1.0])
         return _Inertia(self.mass, flip * self.first, np.outer(flip, flip) * self.second)
 
     def minus(self) -> _Inertia:
-        """What takes it away."""
+        """The negative of the inertia."""
         return _Inertia(-self.mass, -self.first, -self.second)
 
 
@@ -94,7 +94,7 @@ def newton_euler(
     base: Base,
     half: Half = "mean",
 ) -> tuple[ca.SX, list[FrameMotion]]:
-    """What forces a motion of the folded robot needs.
+    """Inverse dynamics of the folded robot, by recursive Newton-Euler.
 
     Args:
         robot: The robot.
@@ -210,7 +210,7 @@ def _wrench(
 
 
 def _rotation(axis: Array, angle: ca.SX) -> ca.SX:
-    """Rodrigues' formula."""
+    """Rotation matrix about an axis a, `1 + sin(angle) a^ + (1 - cos(angle)) a^ a^` (Rodrigues)."""
     skew = ca.sparsify(ca.DM(np.cross(np.eye(3), axis)))
     return ca.SX.eye(3) + ca.sin(angle) * skew + (1.0 - ca.cos(angle)) * (skew @ skew)
 
@@ -237,7 +237,7 @@ def _links(robot: Robot, leg: str, half: Half) -> list[_Link]:
 
 
 def mirrored(leg: str) -> str:
-    """The leg on the other side: FL and FR, RL and RR."""
+    """Name of the leg on the other side: FL and FR, RL and RR."""
     return leg[:-1] + _MIRROR[leg[-1]]
 
 

@@ -1,4 +1,4 @@
-"""From a gait problem to its solution."""
+"""Gait optimisation: from a gait problem to its solution, by IPOPT."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _DERIVATIVES = {"grad_f": "nlp_grad_f", "jac_g": "nlp_jac_g", "hess_lag": "nlp_h
 
 @dataclass(frozen=True, eq=False)
 class SolverState:
-    """Where the solver stopped, for a warm start.
+    """Final iterate of the solver, for a warm start.
 
     Attributes:
         x: The unknowns of the transcription.
@@ -137,17 +137,17 @@ def optimize_gait(
     check_ballistics(problem)
     if isinstance(initial, GaitSolution):
         _check_alike(initial.problem, problem)
-    found = _solve(problem, initial)
+    run = _solve(problem, initial)
     program, p = _program(problem), _parameters(problem)
-    violations = program.violations(found.state.x, p)
+    violations = program.violations(run.state.x, p)
     worst = {name: violation.value for name, violation in violations.items()}
-    if not found.success or max(worst.values()) > TOLERANCE:
+    if not run.success or max(worst.values()) > TOLERANCE:
         gives = _fights(problem) if diagnose else None
-        raise GaitNotFound(problem.speed, found.status, worst, gives, remedies(gives))
-    return _solution(problem, found.state, found)
+        raise GaitNotFound(problem.speed, run.status, worst, gives, remedies(gives))
+    return _solution(problem, run.state, run)
 
 
-def _solution(problem: GaitProblem, state: SolverState, found: _Found) -> GaitSolution:
+def _solution(problem: GaitProblem, state: SolverState, run: _Found) -> GaitSolution:
     program, model = _program(problem), fold_problem(problem)
     values = program.unpack(state.x)
     motions = {phase.name: unfolded(model, values, phase) for phase in problem.sequence}
@@ -162,10 +162,10 @@ def _solution(problem: GaitProblem, state: SolverState, found: _Found) -> GaitSo
         gait=Gait(problem.robot.name, problem.speed, problem.apex, tuple(phases)),
         motions=motions,
         impulses=impulses,
-        cost=found.cost,
+        cost=run.cost,
         violations=program.violations(state.x, _parameters(problem)),
-        iterations=found.iterations,
-        solve_time=found.solve_time,
+        iterations=run.iterations,
+        solve_time=run.solve_time,
         state=state,
     )
 
@@ -176,8 +176,10 @@ def fit_phase(solution: GaitSolution, phase: ContactPhase) -> GaitPhase:
 
 
 def resampled(solution: GaitSolution, intervals: Sequence[int]) -> SolverState:
-    """A solution on another mesh, for a warm start there: the unknowns and their bounds'
-    multipliers interpolated, the constraints' multipliers left to the solver."""
+    """Interpolate a solution to another mesh, for a warm start there.
+
+    The unknowns and their bounds' multipliers are interpolated, the constraints' are zero.
+    """
     problem, before = solution.problem, _program(solution.problem)
     program = _program(problem.remeshed(intervals))
 
@@ -209,14 +211,14 @@ def _check_alike(initial: GaitProblem, problem: GaitProblem) -> None:
 
 
 def _fights(problem: GaitProblem) -> dict[str, float] | None:
-    """Which demands have to give way; a coarse mesh is enough to tell."""
+    """Find the conflicting demands, on a coarse mesh, which is enough to tell."""
     coarse = problem.remeshed([_COARSE] * len(problem.sequence))
     program = _program(coarse)
     return fights(program, program.pack(vertical_hop(coarse)), _parameters(problem))
 
 
 class _Found(NamedTuple):
-    """What the solver came back with."""
+    """Result of one run of the solver."""
 
     state: SolverState
     cost: float

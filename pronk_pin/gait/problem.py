@@ -1,4 +1,4 @@
-"""What a gait is asked to be, and in which order the feet stand and fly."""
+"""Gait problems: contact sequence, bounds, weights and demands of an optimisation."""
 
 from __future__ import annotations
 
@@ -201,7 +201,7 @@ class GaitProblem:
         return tuple(leg for leg in self.robot.legs if leg[:-1] in standing)
 
     def before(self, index: int) -> ContactPhase:
-        """The phase that leads to the phase of an index; the last one leads to the first."""
+        """The phase before the phase of an index; the last one comes before the first."""
         return self.sequence[index - 1]
 
     def landing(self, index: int) -> tuple[Pair, ...]:

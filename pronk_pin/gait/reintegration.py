@@ -1,11 +1,11 @@
-"""The optimised torques played on Pinocchio's model: an independent integration of a gait.
+"""Independent integration of a gait: the optimised torques on Pinocchio's model.
 
 The collocation asks for the equations of motion at its nodes only. Here the whole robot, with all
 its joints, follows the same torques through an adaptive integrator; how far it ends up from the
 optimised motion is the error that the mesh made.
 
-The trunk is held by a guide to the sagittal plane, without rotation or free to pitch, so the
-coordinates are x, z, perhaps pitch, and the joints; the guide takes the other rows.
+A planar constraint holds the trunk to the sagittal plane, without rotation or free to pitch, so
+that the coordinates are x, z, perhaps pitch, and the joints; it takes the other rows.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _TOLERANCE = 1e-10
 
 
 class Worst(NamedTuple):
-    """A largest value, and when it is met."""
+    """A largest value, and its time."""
 
     value: float
     time: float
@@ -79,10 +79,10 @@ def drift(
             rate, (times[0], times[2]), state, method="DOP853", rtol=_TOLERANCE, atol=_TOLERANCE
         )
         state = np.asarray(result.y[:, -1])
-        reached, wanted = state[:n], position[k + 2]
-        joints = max(joints, Worst(float(np.max(np.abs(reached - wanted)[2:])), times[2]))
+        reached, target = state[:n], position[k + 2]
+        joints = max(joints, Worst(float(np.max(np.abs(reached - target)[2:])), times[2]))
         apart = foot_positions(robot, _configuration(robot, reached)) - foot_positions(
-            robot, _configuration(robot, wanted)
+            robot, _configuration(robot, target)
         )
         moved = max(moved, Worst(float(np.max(np.linalg.norm(apart, axis=-1))), times[2]))
     return Drift(joints, moved)
@@ -104,7 +104,7 @@ def _rates(y: Array, n: int, nl: int) -> Array:
 
 
 def _configuration(robot: Robot, y: Array) -> Array:
-    """q of the guided robot from x, z, perhaps pitch, and the joints, shape (19,)."""
+    """Configuration from the planar coordinates x, z, perhaps pitch, and the joints, (19,)."""
     nb = len(y) - robot.nu
     pitch = float(y[2]) if nb > 2 else 0.0
     return robot.q_from_base(np.array([y[0], 0.0, y[1]]), y[nb:], pitch=pitch)

@@ -1,4 +1,4 @@
-"""How nearly a gait in its Bezier form obeys the equations of motion."""
+"""Residual of a gait's Bezier form in the equations of motion (2)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .gait import Gait, Motion
 
 
 class GaitResidual(NamedTuple):
-    """What is missing in the equations of motion (2), where it is most."""
+    """Largest residuals in the equations of motion (2)."""
 
     force: float
     """Along the trunk's x and z [N]."""
@@ -29,7 +29,7 @@ class GaitResidual(NamedTuple):
 
 
 def missing_forces(robot: Robot, motion: Motion, contact: Contact) -> Array:
-    """What a motion, its torques and its contact forces leave in eq. (2), shape (n, 18)."""
+    """Residual `M a + H v + G - S tau - J^T lam` of eq. (2) along a motion, shape (n, 18)."""
     missing = []
     for q, v, a, tau, lam in zip(motion.q, motion.v, motion.a, motion.tau, motion.lam, strict=True):
         force = pin.rnea(robot.model, robot.data, q, v, a).copy()
@@ -47,13 +47,13 @@ def gait_residual(
     base: Base = "locked",
     samples: int = 41,
 ) -> GaitResidual:
-    """Put a gait's motion, torques and contact forces into the equations of motion.
+    """Evaluate the residual of a gait's motion, torques and contact forces in eq. (2).
 
     Args:
         robot: The robot.
         gait: The gait.
         contact: How its feet stand.
-        base: How the trunk may move; what a guide holds it by is not missing.
+        base: How the trunk may move; the planar constraint's forces are no residual.
         samples: Phases at which to look, in each phase of the gait.
     """
     as_robot(robot)

@@ -1,4 +1,4 @@
-"""The gaits known by name: what a gait problem of each style looks like."""
+"""Gait styles known by name, and the gait problems they stand for."""
 
 from __future__ import annotations
 
@@ -84,14 +84,14 @@ def gait_problem(
     """
     style = load_style(gait)
     base = style.base if base is None else known_base(base)
-    given: dict[str, Any] = {
+    defaults: dict[str, Any] = {
         "apex": style.apex,
         "base": base,
         "sequence": style.pitching if base == "sagittal" else style.sequence,
         "stride": style.stride,
     }
     _check_changes(changes)
-    return GaitProblem(robot, speed, **(given | changes))
+    return GaitProblem(robot, speed, **(defaults | changes))
 
 
 def _check_changes(changes: Mapping[str, Any]) -> None:
@@ -120,7 +120,7 @@ _MOST = 1000
 
 
 def number_range(name: str, words: Iterable[str]) -> tuple[float, ...]:
-    """Numbers from words, each a number or a range A:B:STEP with both ends, increasing.
+    """Parse texts, each a number or a range A:B:STEP with both ends, into increasing numbers.
 
     Raises:
         InvalidInput: A word is neither.

@@ -47,7 +47,7 @@ class Constraint:
 
 
 class Violation(NamedTuple):
-    """The worst violation of a constraint."""
+    """Worst violation of a constraint, and its place."""
 
     value: float
     """In the constraint's unit; 0 where it is met."""
@@ -81,7 +81,7 @@ class Transcription:
         cost: ca.SX,
         constraints: tuple[Constraint, ...],
     ) -> Transcription:
-        """Put a program together."""
+        """Assemble a program from its blocks."""
         x, g = _stacked_unknowns(unknowns), _stacked_constraints(constraints)
         evaluate = ca.Function("evaluate", [x, parameters], [g])
         return cls(unknowns, parameters, cost, constraints, evaluate)
@@ -141,11 +141,11 @@ class Transcription:
 
     def violations(self, x: Array, p: Array) -> dict[str, Violation]:
         """The worst violation of each named constraint, bounds included."""
-        found: dict[str, Violation] = {}
+        worst_of: dict[str, Violation] = {}
 
         def note(name: str, excess: float, where: str) -> None:
-            if name not in found or excess > found[name].value:
-                found[name] = Violation(excess, where)
+            if name not in worst_of or excess > worst_of[name].value:
+                worst_of[name] = Violation(excess, where)
 
         g, start = np.array(self.evaluate(x, p)).ravel(), 0
         for constraint in self.constraints:
@@ -162,7 +162,7 @@ class Transcription:
                     where = f"{unknown.where}, node {nodes[row]}"
                     note(limit, float(excess[nodes[row], row]), where)
         return {
-            name: Violation(max(0.0, worst.value), worst.where) for name, worst in found.items()
+            name: Violation(max(0.0, worst.value), worst.where) for name, worst in worst_of.items()
         }
 
 

@@ -1,7 +1,7 @@
-"""Which contact forces a motion needs: the equations, and their cheapest solution in closed form.
+"""Contact forces of a motion: the equations, and their cheapest solution in closed form.
 
 The unknowns y stack the contact forces lam, foot by foot, and the guide's forces w. They must meet
-the base's equations, and what they leave to the joints the motors give:
+the base's equations, and the motors give the joints' remaining torques:
 
     minimise    |b_joints - lever lam|^2 + weight |lam|^2
     subject to  wrench y = b_base
@@ -58,7 +58,7 @@ class ForceProblem(NamedTuple):
         return self.b_joints - apply(self.lever, y[..., : self.contacts])
 
     def rest(self, y: Array) -> Array:
-        """What forces y leave of the base's equations [N, N m], shape (..., 6)."""
+        """Residual `b_base - wrench y` of the base's equations [N, N m], shape (..., 6)."""
         return self.b_base - apply(self.wrench, y)
 
 
@@ -72,13 +72,13 @@ class SaddlePoint(NamedTuple):
     rhs: Array
     """Shape (..., size + 6)."""
 
-    def correction(self, rest: Array, rows: IntArray) -> Array:
-        """The cheapest change of y that does away with a rest (m, 6) of the base's equations, at
+    def correction(self, residual: Array, rows: IntArray) -> Array:
+        """Cheapest change of y that removes a residual (m, 6) of the base's equations, at
         some of n instants, shape (m, size)."""
-        return apply(self.inverse[rows, :-NB, -NB:], rest)
+        return apply(self.inverse[rows, :-NB, -NB:], residual)
 
     def solve(self) -> Array:
-        """y; where the base's equations cannot be met, the one that violates them least."""
+        """Solve for y; where the base's equations cannot be met, violate them least."""
         z = apply(self.inverse, self.rhs)
         for _ in range(_STEPS):
             # Refined towards the undamped equations; multipliers of those that cannot be met grow.

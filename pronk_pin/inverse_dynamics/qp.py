@@ -66,8 +66,8 @@ def constrained_forces(
     met = np.empty(len(rows), dtype=bool)
     for k in range(len(rows)):
         forces[k], met[k] = chain.solve(k)
-    rest = np.where(met[:, None], chosen.rest(forces), 0.0)
-    return forces + conditions.correction(rest, rows)
+    residual = np.where(met[:, None], chosen.rest(forces), 0.0)
+    return forces + conditions.correction(residual, rows)
 
 
 class _Chain:
@@ -91,7 +91,7 @@ class _Chain:
         self._warm: proxqp.dense.QP | None = None
 
     def solve(self, k: int) -> tuple[Array, bool]:
-        """Forces of instant k, and whether they meet the base's equations."""
+        """Solve instant k: its forces, and whether they meet the base's equations."""
         terms = self._terms(k)
         if self._warm is not None:
             self._warm.update(**terms, **_WARM)
@@ -146,6 +146,6 @@ def _new_qp(terms: dict[str, Array]) -> proxqp.dense.QP:
 
 
 def _solved(qp: proxqp.dense.QP) -> bool:
-    """Solve; whether the accuracy is met."""
+    """Solve a QP, and return whether the accuracy is met."""
     qp.solve()
     return bool(qp.results.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED)

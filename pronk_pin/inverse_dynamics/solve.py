@@ -254,7 +254,7 @@ def _constrain(
     friction: float,
     tau_max: Array,
 ) -> BoolArray:
-    """Bring forces y (n, size) in place within cones and limits; which ones are, shape (n,)."""
+    """Bring forces y (n, size) within cones and limits, in place; return which are, shape (n,)."""
     contacts = problem.contacts
     sides = cone_sides(friction, contacts // 3).T  # (3 feet, 8 feet)
 

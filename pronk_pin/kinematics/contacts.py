@@ -24,7 +24,7 @@ from .._typing import Array
 from ..robot import Robot
 
 Contact = Literal["point", "rolling"]
-"""How a foot stands on the ground."""
+"""Contact model of a foot: "point" or "rolling"."""
 
 CONTACTS: tuple[Contact, ...] = ("point", "rolling")
 

@@ -18,7 +18,7 @@ from ..robot import JOINTS, NB, Robot
 from .legs import Hip, Knee, LegGeometry, leg_angles, leg_geometry, leg_motion
 
 _ROUND_OFF = 1e-9
-"""How far a joint limit [rad] may be exceeded by round-off."""
+"""Round-off [rad] by which a joint limit may be exceeded."""
 
 
 class LegSolution(NamedTuple):
@@ -218,7 +218,7 @@ def rotate_leg(robot: Robot, joints: npt.ArrayLike, delta: npt.ArrayLike) -> Arr
 
 
 def _in_range(angles: Array, low: Array, high: Array) -> tuple[Array, BoolArray]:
-    """Angles (..., 3) up to whole turns, as near the middle of their range as can be; whether all
+    """Angles (..., 3) wrapped as near the middle of their range as can be; whether all
     are within it, shape (...)."""
     # The middle counts: the thigh of the A1 goes beyond pi.
     middle = 0.5 * (low + high)

@@ -19,13 +19,13 @@ from ..errors import InvalidInput
 from ..robot import JOINTS, Robot
 
 Knee = Literal["backward", "forward"]
-"""Which way a knee points; backward is a negative calf angle, as on the A1."""
+"""Direction in which a knee points; backward is a negative calf angle, as on the A1."""
 
 Hip = Literal["above", "below"]
 """Whether the hip is above its foot, as in standing and walking, or below it."""
 
 _ROUND_OFF = 1e-9
-"""How far the reach of the links may be exceeded by round-off."""
+"""Relative round-off by which the reach of the links may be exceeded."""
 
 _AXES = {"hip": "RX", "thigh": "RY", "calf": "RY"}
 
@@ -115,7 +115,7 @@ def leg_motion(geometry: LegGeometry, joints: Array, rates: Array) -> LegMotion:
 
 
 class ContactPoints(NamedTuple):
-    """Where feet touch the ground, in the trunk's frame."""
+    """Contact points of feet with the ground, in the trunk's frame."""
 
     position: Array
     """From the trunk's origin [m], shape (..., legs, 3)."""
@@ -125,7 +125,7 @@ class ContactPoints(NamedTuple):
 
 
 def contact_points(geometry: LegGeometry, joints: Array, down: Array) -> ContactPoints:
-    """The points of the feet at `down` from their centres, and the Jacobians of their legs.
+    """Contact points of the feet at `down` from their centres, and the Jacobians of their legs.
 
     Args:
         geometry: Offsets of the legs.
@@ -143,7 +143,7 @@ def contact_points(geometry: LegGeometry, joints: Array, down: Array) -> Contact
 def leg_angles(
     geometry: LegGeometry, positions: Array, *, knee: Knee = "backward", hip: Hip = "above"
 ) -> tuple[Array, BoolArray]:
-    """Joint angles that put the feet's centres somewhere, and whether the links reach there.
+    """Closed-form joint angles for positions of the feet's centres, and whether they are in reach.
 
     Args:
         geometry: Offsets of the legs, or of one leg.
@@ -171,7 +171,7 @@ def leg_angles(
 def _two_links(
     offsets: LegGeometry, x: Array, z: Array, knee: Knee
 ) -> tuple[Array, Array, BoolArray]:
-    """Thigh and calf angle that put the foot at (x, z) from the thigh joint; whether they can."""
+    """Thigh and calf angle that put the foot at (x, z) from the thigh joint; whether in reach."""
     calf, foot = offsets.calf, offsets.foot
     upper, lower = np.hypot(calf[..., 0], calf[..., 2]), np.hypot(foot[..., 0], foot[..., 2])
     cosine = (x**2 + z**2 - upper**2 - lower**2) / (2.0 * upper * lower)

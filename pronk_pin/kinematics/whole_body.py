@@ -24,17 +24,17 @@ _STALLED = 1e-12
 
 
 class WholeBodySolution(NamedTuple):
-    """A configuration that puts trunk and feet where they are wanted, or as near as can be."""
+    """Configuration with trunk and feet at their targets, or as near as can be."""
 
     q: Array
     """Configuration, shape (19,), within the joint limits."""
     reached: bool
     """Whether every target is met to the tolerance."""
     base_error: Array
-    """What is left between the trunk and its target: the translation [m] and rotation [rad] to it,
+    """Remaining error of the trunk's pose: the translation [m] and rotation [rad] to its target,
     in the trunk's frame, shape (6,); zero where the trunk is free."""
     foot_errors: Array
-    """What is left between the feet and their targets, in the world [m], shape (feet, 3)."""
+    """Remaining errors of the feet's positions, in the world [m], shape (feet, 3)."""
     iterations: int
     """Steps that were taken."""
 
@@ -57,7 +57,7 @@ class _Task(NamedTuple):
         return np.array(pin.log6(robot.data.oMi[1].actInv(self.base)).vector), apart
 
     def cost(self, errors: tuple[Array, Array]) -> float:
-        """What the steps reduce."""
+        """Weighted sum of squared errors that the steps reduce."""
         base, feet = errors
         return float(self.weight * base @ base + np.sum(feet**2))
 
@@ -121,7 +121,7 @@ def inverse_kinematics(
 def _descend(
     robot: Robot, task: _Task, q: Array, tolerance: float, iterations: int
 ) -> WholeBodySolution:
-    """Steps until the targets are reached or come no nearer."""
+    """Iterate until the targets are reached or come no nearer."""
     qp = proxqp.dense.QP(robot.nv, 0, robot.nu)
     qp.settings.eps_abs, qp.settings.eps_rel = _ACCURACY, 0.0
     errors, taken = task.errors(robot, q), 0

@@ -1,4 +1,4 @@
-"""Are two models the same robot? Masses, joints and motors side by side, and M, h and J."""
+"""Parity of two robot models: masses, joints and motors side by side, and M, h and J."""
 
 from .models import ROUND_OFF, SIX_DIGITS, Model, Parity, compare_models
 from .table import Row, format_value, merged

@@ -1,4 +1,4 @@
-"""What a MuJoCo model's actuators do to the joint they act on."""
+"""Actuators of a MuJoCo model: kinds, gains and limits at the joint they act on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def joint_actuators(model: mujoco.MjModel) -> list[int]:
 
 
 def through_gears(model: mujoco.MjModel, name: str, drives: list[int], gears: list[float]) -> float:
-    """A property of the actuators as it is felt at their joint; MuJoCo 3 has none such."""
+    """A property of the actuators as it acts at their joint; MuJoCo 3 has none such."""
     values = getattr(model, name, np.zeros(len(model.actuator_trntype)))
     return float(sum(gear**2 * values[index] for index, gear in zip(drives, gears, strict=True)))
 
@@ -51,7 +51,7 @@ def actuator_kind(model: mujoco.MjModel, drives: list[int]) -> tuple[str | None,
 def torque_limits(
     model: mujoco.MjModel, joint: int, drives: list[int], gain: float | None
 ) -> Array:
-    """What the joint's actuator can give at most, by whichever limit is the tightest."""
+    """Torque limits of a joint's actuator, by whichever limit is the tightest."""
     ranges = [np.array([-np.inf, np.inf])]
     if model.jnt_actfrclimited[joint]:
         ranges.append(model.jnt_actfrcrange[joint])

@@ -1,4 +1,4 @@
-"""A robot as a mechanism: what two engines' models of it can be compared by.
+"""Engine-neutral description of a robot as a mechanism, by which models are compared.
 
 Everything is placed relative to the joints' anchors, in the axes that the trunk has at zero joint
 angles. So it does not matter where a model attaches its bodies' frames, nor how it turns them:
@@ -28,7 +28,7 @@ _HUGE = 1e300
 
 
 class Link(NamedTuple):
-    """What moves with a joint, in the trunk's axes at zero joint angles."""
+    """Rigid body that moves with a joint, in the trunk's axes at zero joint angles."""
 
     mass: float
     """[kg]"""
@@ -116,7 +116,7 @@ class Dynamics(NamedTuple):
 
 
 class Engine(Protocol):
-    """What computes the dynamics of a mechanism."""
+    """Computes the dynamics of a mechanism."""
 
     def evaluate(self, names: tuple[str, ...], points: list[Point], state: State) -> Dynamics:
         """M, h and J, with the joints in the order of `names`."""
@@ -125,7 +125,7 @@ class Engine(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A robot as one of the engines has read it.
+    """A robot as an engine has read it.
 
     Attributes:
         label: What it was read from, for people.

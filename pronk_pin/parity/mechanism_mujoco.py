@@ -44,7 +44,7 @@ def read_mujoco(model: mujoco.MjModel, label: str, *, round_off: float = 0.0) ->
 
 
 class _Reader:
-    """Which bodies and joints are the robot's, and where they are at zero joint angles."""
+    """Bodies and joints of the robot, and their places at zero joint angles."""
 
     def __init__(self, model: mujoco.MjModel, label: str) -> None:
         self.model = model
@@ -101,7 +101,7 @@ class _Reader:
             self.bodies.add(0)
 
     def _count(self, roots: list[int]) -> int:
-        """How many hinges, slides and balls bodies under these roots have."""
+        """Number of hinges, slides and balls of the bodies under these roots."""
         body = self.model.jnt_bodyid
         inside = np.isin(self.model.body_rootid[body], roots)
         return int(np.count_nonzero(inside & (self.model.jnt_type != _FREE)))
@@ -182,7 +182,7 @@ class _Reader:
         """Spheres that collide, at the ends of the limbs."""
         model = self.model
         bearing = {self.link_of(model.body_parentid[model.jnt_bodyid[j]]) for j in self.joints}
-        found: dict[str, list[Foot]] = {}
+        spheres: dict[str, list[Foot]] = {}
         for geom in range(model.ngeom):
             body = int(model.geom_bodyid[geom])
             solid = model.geom_contype[geom] or model.geom_conaffinity[geom]
@@ -195,8 +195,8 @@ class _Reader:
             place = self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ model.geom_pos[geom]
             centre = self._in_trunk(place) - self.anchors[link]
             foot = Foot(model.geom(geom).name, centre, float(model.geom_size[geom, 0]))
-            found.setdefault(link, []).append(foot)
-        return {link: tuple(feet) for link, feet in found.items()}
+            spheres.setdefault(link, []).append(foot)
+        return {link: tuple(feet) for link, feet in spheres.items()}
 
 
 def _gravity(model: mujoco.MjModel) -> Array:
@@ -205,7 +205,7 @@ def _gravity(model: mujoco.MjModel) -> Array:
 
 
 def _extras(model: mujoco.MjModel, reader: _Reader) -> dict[str, int]:
-    """What else acts on the robot, counted."""
+    """Counts of other elements that act on the robot."""
     dofs = [model.jnt_dofadr[joint] for joint in reader.joints]
     nonlinear = sum(
         int(np.any(getattr(model, name)[rows], axis=1).sum())

@@ -1,4 +1,4 @@
-"""Are two models the same robot? Masses, joints and motors side by side, and M, h and J.
+"""Parity of two robot models: masses, joints and motors side by side, and M, h and J.
 
 A model is a `Robot`, a URDF, an MJCF, or a compiled MuJoCo model. Links and joints are matched by
 the joints' names, so that the order of the joints does not matter, and compared relative to the
@@ -29,7 +29,7 @@ from .mechanism_mujoco import read_mujoco
 from .table import Row, compare_tables, format_table, format_value
 
 Model: TypeAlias = Robot | str | Path | mujoco.MjModel
-"""What can be compared."""
+"""Kinds of models that can be compared."""
 
 ROUND_OFF = 1e-9
 """Relative tolerance for models with all their digits."""
@@ -42,7 +42,7 @@ SIX_DIGITS = 1e-5
 
 @dataclass(frozen=True)
 class Parity:
-    """Whether two models are the same robot, and where they differ.
+    """Result of the comparison of two models: agreement, and the differences.
 
     Attributes:
         a, b: What was compared.
@@ -81,12 +81,12 @@ class Parity:
         return same and not self.differences
 
     def to_json(self) -> str:
-        """Everything in it as text; `from_json` reads it."""
+        """The comparison as JSON; `from_json` reads it."""
         return json.dumps(_written(dataclasses.asdict(self)), indent=1)
 
     @classmethod
     def from_json(cls, text: str) -> Parity:
-        """The comparison that `to_json` wrote.
+        """Read the comparison that `to_json` wrote.
 
         Raises:
             InvalidInput: The text is something else.
@@ -191,7 +191,7 @@ def compare_models(
 
 
 def _written(value: Any) -> Any:
-    """Plain data in which JSON's lack of infinity and NaN is made good: words and null."""
+    """Plain data for JSON, which has no infinity and NaN: words and null instead."""
     if isinstance(value, dict):
         return {key: _written(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
@@ -216,7 +216,7 @@ def _read_again(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _obstacle(a: Mechanism, b: Mechanism) -> str:
-    """Why M, h and J of two mechanisms cannot be compared; empty if they can."""
+    """Reason for which M, h and J of two mechanisms cannot be compared; empty if they can."""
     for one, other in ((a, b), (b, a)):
         missing = [name for name in other.joints if name not in one.joints]
         if missing:
@@ -284,12 +284,12 @@ def _read(model: Model) -> Mechanism:
 
 
 def _model_name(model: mujoco.MjModel) -> str:
-    """MuJoCo keeps the model's name at the start of its names."""
+    """Name of a MuJoCo model, which stands at the start of its names."""
     return bytes(model.names).split(b"\0", 1)[0].decode(errors="replace") or "a model"
 
 
 def _read_file(path: Path) -> Mechanism:
-    """A URDF by Pinocchio, an MJCF by MuJoCo; which it is, its first element tells."""
+    """Read a URDF by Pinocchio or an MJCF by MuJoCo, as its first element tells."""
     try:
         root = ElementTree.parse(path).getroot().tag
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The table of a comparison of two models: its rows, and how they are printed."""
+"""Table of the comparison of two models: its rows, and their text."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WIDEST = 34
 
 @dataclass(frozen=True)
 class Row:
-    """One thing compared.
+    """One compared quantity.
 
     Attributes:
         what: The quantity, as "centre of mass".

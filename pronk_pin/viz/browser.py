@@ -38,7 +38,7 @@ _FLAGS = (
 )
 
 _PATIENCE = 60.0
-"""How long an answer may take [s]."""
+"""Timeout of an answer [s]."""
 
 
 def find_browser() -> str:
@@ -49,8 +49,8 @@ def find_browser() -> str:
     """
     named = os.environ.get(VARIABLE)
     for name in [named] if named else _NAMES:
-        if found := shutil.which(name):
-            return found
+        if program := shutil.which(name):
+            return program
     raise NoBrowser(f"{VARIABLE}={named} is no program" if named else "none is installed")
 
 
@@ -126,10 +126,10 @@ class Browser:
                 if "error" in answer:
                     raise NoBrowser(f"it refuses {method} ({answer['error'].get('message')})")
                 return dict(answer.get("result", {}))
-            told = answer.get("params", {})
-            failed = told.get("entry", {}).get("level") == "error"
+            params_received = answer.get("params", {})
+            failed = params_received.get("entry", {}).get("level") == "error"
             if answer.get("method") == "Runtime.exceptionThrown" or failed:
-                self.errors.append(json.dumps(told))
+                self.errors.append(json.dumps(params_received))
 
     def run(self, expression: str) -> Any:
         """Value of a JavaScript expression in the page; a promise is waited for."""
@@ -160,7 +160,7 @@ class Browser:
             time.sleep(0.02)
 
     def screenshot(self) -> bytes:
-        """What is on the screen, as PNG."""
+        """Screenshot, as PNG."""
         # Two frames on, what was true before is drawn and composed.
         self.run("new Promise((f) => requestAnimationFrame(() => requestAnimationFrame(f)))")
         return base64.b64decode(self.call("Page.captureScreenshot")["data"])
@@ -190,8 +190,8 @@ class Browser:
             ]
         ):
             time.sleep(0.05)
-        found = self.call("Target.attachToTarget", targetId=pages[0]["targetId"], flatten=True)
-        self._session = found["sessionId"]
+        attached = self.call("Target.attachToTarget", targetId=pages[0]["targetId"], flatten=True)
+        self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
 
@@ -210,7 +210,7 @@ class Browser:
         return message
 
     def _gone(self) -> NoBrowser:
-        """What its last words were."""
+        """Last output of the browser."""
         self._log.seek(0)
         words = self._log.read().decode(errors="replace").strip().splitlines()
         return NoBrowser(f"{Path(self._program).name} ended ({' '.join(words[-2:])})")

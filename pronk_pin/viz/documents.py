@@ -23,7 +23,7 @@ _USE_STEPS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 
 
 def robot_blob(scene: Scene) -> bytes:
-    """What does not move by itself: meshes, joints, names, colours."""
+    """Static part of a scene for the page: meshes, joints, names, colours."""
     look, robot = scene.appearance, scene.robot
     meshes: list[Mesh] = []
     for part in look.parts:
@@ -64,7 +64,7 @@ def robot_blob(scene: Scene) -> bytes:
 
 
 def film_blob(scene: Scene, *, fps: float = FPS) -> bytes:
-    """What moves: the scene's tracks over its duration."""
+    """Moving part of a scene for the page: its tracks over its duration."""
     times = scene.times(fps)
     rows = scene.rows(times)
     return pack(
@@ -119,7 +119,7 @@ def _track(track: Track, row: dict[str, Array]) -> dict[str, Any]:
 def _end(
     scene: Scene, rows: list[dict[str, Array]], key: str, steps: tuple[float, ...]
 ) -> float | None:
-    """Where a colour scale ends: the least step that covers nearly all of what is shown."""
+    """End of a colour scale: the least step that covers nearly all of what is shown."""
     limit = scene.robot.tau_max if key == "torque" else 1.0
     shown = [np.abs(row[key]) / limit for row in rows if key in row]
     if not shown or np.all(np.isnan(np.concatenate(shown))):

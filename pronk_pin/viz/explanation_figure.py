@@ -39,11 +39,11 @@ def explanation_figure(explanation: Explanation, *, speed: float | None = None) 
     """
     figure = new_figure(10.0, 6.0)
     grid = figure.add_gridspec(2, 3, width_ratios=[1.2, 1.2, 1.0])
-    found = explanation.shares.sel(speed=0.5 if speed is None else speed, method="nearest")
+    shares = explanation.shares.sel(speed=0.5 if speed is None else speed, method="nearest")
     for row, joint in enumerate(_JOINTS):
         for column, part in enumerate(("stance", "flight")):
             axes = figure.add_subplot(grid[row, column])
-            _stacked(axes, explanation, float(found["speed"]), part, joint)
+            _stacked(axes, explanation, float(shares["speed"]), part, joint)
             if row == 1:
                 axes.set_xlabel(f"phase of {part}")
             if column == 0:
@@ -53,7 +53,7 @@ def explanation_figure(explanation: Explanation, *, speed: float | None = None) 
     _parameters(figure.add_subplot(grid[:, 2]), explanation)
     figure.suptitle(
         f"What was learned, by cause: {explanation.attributes.get('controller', '')} in "
-        f"'{explanation.attributes.get('scenario', '')}' at {float(found['speed']):g} m/s"
+        f"'{explanation.attributes.get('scenario', '')}' at {float(shares['speed']):g} m/s"
     )
     return figure
 
@@ -74,18 +74,18 @@ def _stacked(axes: Axes, explanation: Explanation, speed: float, part: str, join
     """Causes stacked from zero, those that push up above and those that push down below."""
     name = f"{_LEG}_{joint}"
     at = {"speed": speed, "part": part, "joint": name}
-    found = explanation.shares
-    phase = found["phase"].to_numpy()
-    whole = discrepancy(found).sel(at).to_numpy()
-    known = np.isfinite(whole)
-    torque = found["torque"].sel(at)
-    above, below = np.zeros((2, known.sum()))
-    for cause in map(str, found["cause"].to_numpy()):
-        values = torque.sel(cause=cause).to_numpy()[known]
+    shares = explanation.shares
+    phase = shares["phase"].to_numpy()
+    whole = discrepancy(shares).sel(at).to_numpy()
+    finite = np.isfinite(whole)
+    torque = shares["torque"].sel(at)
+    above, below = np.zeros((2, finite.sum()))
+    for cause in map(str, shares["cause"].to_numpy()):
+        values = torque.sel(cause=cause).to_numpy()[finite]
         top, bottom = above + np.maximum(values, 0.0), below + np.minimum(values, 0.0)
         color = COLORS.get(cause, "#000000")
-        axes.fill_between(phase[known], above, top, label=cause, color=color, lw=0.0)
-        axes.fill_between(phase[known], below, bottom, color=color, lw=0.0)
+        axes.fill_between(phase[finite], above, top, label=cause, color=color, lw=0.0)
+        axes.fill_between(phase[finite], below, bottom, color=color, lw=0.0)
         above, below = top, bottom
     axes.plot(phase, whole, color="black", lw=1.4, label="learned - model")
     axes.axhline(0.0, color="0.3", lw=0.5)

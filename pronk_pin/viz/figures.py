@@ -58,11 +58,11 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
         speed: Which robot [m/s].
         seconds: How much to show before and after the switch [s].
     """
-    mine = strides.sel(speed=speed, method="nearest")
-    count = int(mine["count"])
-    learning = np.flatnonzero(mine["learning"].to_numpy()[:count] == 1)
+    of_speed = strides.sel(speed=speed, method="nearest")
+    count = int(of_speed["count"])
+    learning = np.flatnonzero(of_speed["learning"].to_numpy()[:count] == 1)
     switch = int(learning[0]) if learning.size else count
-    start = mine["start"].to_numpy()
+    start = of_speed["start"].to_numpy()
     began = start[min(switch, count - 1)]
     shown = np.flatnonzero((start >= began - seconds[0]) & (start <= began + seconds[1]))
     figure = new_figure(TWO_COLUMNS, 3.6)
@@ -70,7 +70,7 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
     time: Axes | None = None
     for row, joint in enumerate(SHOWN):
         time = figure.add_subplot(grid[row, :2], sharex=time)
-        _over_time(time, mine, f"{_LEG}_{joint}", shown, switch)
+        _over_time(time, of_speed, f"{_LEG}_{joint}", shown, switch)
         if learning.size:
             time.axvline(began, color=ACCENT, lw=1.0)
             time.annotate("learning on", (began, 1.02), xycoords=("data", "axes fraction"))
@@ -80,7 +80,7 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
             if stride < 0:
                 continue  # nothing before the learning
             first = figure.add_subplot(grid[row, 2 + column], sharey=first)
-            _one_stance(first, mine, f"{_LEG}_{joint}", stride, name)
+            _one_stance(first, of_speed, f"{_LEG}_{joint}", stride, name)
             if row == 1:
                 first.set_xlabel("stance phase")
     if time is not None:
@@ -89,21 +89,21 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
     return figure
 
 
-def _over_time(axes: Axes, mine: xr.Dataset, joint: str, shown: IntArray, switch: int) -> None:
+def _over_time(axes: Axes, strides: xr.Dataset, joint: str, shown: IntArray, switch: int) -> None:
     """Measured and planned angle of a joint in the stances of some strides."""
-    measured, planned = _joint_curves(mine, joint)
-    since = mine["phase"].to_numpy() * float(mine["planned_duration"].sel(part="stance"))
+    measured, planned = _joint_curves(strides, joint)
+    since = strides["phase"].to_numpy() * float(strides["planned_duration"].sel(part="stance"))
     for k in shown:
-        t = mine["start"].to_numpy()[k] + since
+        t = strides["start"].to_numpy()[k] + since
         axes.plot(t, planned, "--", color=REFERENCE, lw=0.8)
         axes.plot(t, measured[k], color=look("ilc" if k >= switch else "pd").color)
 
 
-def _one_stance(axes: Axes, mine: xr.Dataset, joint: str, stride: int, name: str) -> None:
+def _one_stance(axes: Axes, strides: xr.Dataset, joint: str, stride: int, name: str) -> None:
     """Measured and planned angle of a joint in the stance of one stride."""
-    measured, planned = _joint_curves(mine, joint)
-    axes.plot(mine["phase"], planned, "--", color=REFERENCE)
-    axes.plot(mine["phase"], measured[stride], color=look(name).color)
+    measured, planned = _joint_curves(strides, joint)
+    axes.plot(strides["phase"], planned, "--", color=REFERENCE)
+    axes.plot(strides["phase"], measured[stride], color=look(name).color)
     peak = float(np.max(np.abs(measured[stride] - planned)))
     axes.set_title(f"{LABELS[name]}: {peak:.3f} rad")
 
@@ -143,7 +143,7 @@ def torque_surface(strides: xr.Dataset) -> Figure:
 
 @styled
 def learned_minus_model(learned: xr.Dataset, model: xr.Dataset) -> Figure:
-    """What practice adds to the model: learned minus the model's feedforward torque, by speed.
+    """Learned minus the model's feedforward torque, by speed.
 
     Args:
         learned: The strides of a learning controller.

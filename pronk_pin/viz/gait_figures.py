@@ -90,8 +90,8 @@ def stride_figure(library: GaitLibrary, robot: Robot) -> Figure:
                     axes[key].plot(t, values, color=color, lw=1.0)
             start += phase.duration
     _phases(axes, library)
-    for key, one in axes.items():
-        _limits(one, key, robot)
+    for key, panel in axes.items():
+        _limits(panel, key, robot)
     mappable = ScalarMappable(norm, colors)
     figure.colorbar(mappable, ax=list(axes.values()), label="speed [m/s]", shrink=0.5, pad=0.01)
     kind = library.metadata.get("gait", "gait")
@@ -178,9 +178,9 @@ def _axes(figure: Figure, grid: GridSpec, *, pitch: bool) -> dict[str, Axes]:
         axes[key] = figure.add_subplot(grid[4, column])
         axes[key].set_title(titles[key], fontsize=9)
         axes[key].set_xlabel("t / stride", fontsize=8)
-    for one in axes.values():
-        one.tick_params(labelsize=7)
-        one.set_xlim(0.0, 1.0)
+    for panel in axes.values():
+        panel.tick_params(labelsize=7)
+        panel.set_xlim(0.0, 1.0)
     return axes
 
 
@@ -203,12 +203,12 @@ def _curves(motion: Motion, left: list[int]) -> dict[str, Array]:
 def _phases(axes: dict[str, Axes], library: GaitLibrary) -> None:
     """Shade the phases with feet on the ground, the panel's own or any, of the middle gait."""
     gait = library.gaits[len(library.gaits) // 2]
-    for key, one in axes.items():
+    for key, panel in axes.items():
         for phase, start in zip(gait.phases, _starts(gait), strict=True):
             pairs = {_PAIRS[0] if leg.startswith("F") else _PAIRS[1] for leg in phase.feet}
             if pairs and (key.split()[0] in pairs or key.split()[0] not in _PAIRS):
                 end = (start + phase.duration) / gait.duration
-                one.axvspan(start / gait.duration, end, color="0.93", lw=0, zorder=0)
+                panel.axvspan(start / gait.duration, end, color="0.93", lw=0, zorder=0)
 
 
 def _limits(axes: Axes, key: str, robot: Robot) -> None:

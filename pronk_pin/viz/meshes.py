@@ -1,4 +1,4 @@
-"""What the robot looks like: its visual geometry, with the meshes light enough for a page.
+"""Visual geometry of the robot, with meshes light enough for a page.
 
 The A1's meshes have 216,000 triangles, most of them for screws. They are thinned out once in a
 process by clustering vertices; a page with two robots then fits into two megabytes.
@@ -96,11 +96,11 @@ class Appearance:
         """Centres of the feet in the world [m], shape (n, 4, 3), of configurations (n, 19)."""
         # Scratch memory of its own, for pages are drawn from threads.
         model, data = self.robot.model, self.robot.model.createData()
-        found = np.empty((len(q), len(self.robot.legs), 3))
-        for row, one in enumerate(q):
-            pin.framesForwardKinematics(model, data, one)
-            found[row] = [data.oMf[foot].translation for foot in self.robot.foot_ids]
-        return found
+        centres = np.empty((len(q), len(self.robot.legs), 3))
+        for row, configuration in enumerate(q):
+            pin.framesForwardKinematics(model, data, configuration)
+            centres[row] = [data.oMf[foot].translation for foot in self.robot.foot_ids]
+        return centres
 
 
 @lru_cache(maxsize=4)

@@ -48,14 +48,14 @@ def _lowered(value: Any, chunks: list[bytes]) -> Any:
 
 def _rounded(table: npt.NDArray[Any]) -> tuple[list[float], list[float], bytes]:
     """Least values and steps of the columns of a table, and its rounded differences."""
-    known = np.isfinite(table)
-    least = np.min(np.where(known, table, np.inf), axis=0, initial=np.inf)
-    greatest = np.max(np.where(known, table, -np.inf), axis=0, initial=-np.inf)
+    finite = np.isfinite(table)
+    least = np.min(np.where(finite, table, np.inf), axis=0, initial=np.inf)
+    greatest = np.max(np.where(finite, table, -np.inf), axis=0, initial=-np.inf)
     empty = ~np.isfinite(least)
     least[empty], greatest[empty] = 0.0, 0.0
     step = (greatest - least) / _STEPS
-    scaled = np.divide(table - least, step, out=np.zeros_like(table), where=known & (step > 0.0))
-    whole = np.where(known, np.rint(scaled), _NAN).astype("<u2")
+    scaled = np.divide(table - least, step, out=np.zeros_like(table), where=finite & (step > 0.0))
+    whole = np.where(finite, np.rint(scaled), _NAN).astype("<u2")
     differences = np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]), "<u2"))  # mod 2^16
     columns = differences.astype("<u2").T.ravel()
     data = columns.astype("u1").tobytes() + (columns >> 8).astype("u1").tobytes()

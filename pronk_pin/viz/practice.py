@@ -113,11 +113,11 @@ class _Reader:
         # As the experiment does: of a trunk that may turn, the gaits that let it pitch.
         library = load_library(robot.name, base=None if base == "locked" else "sagittal")
         gait = library.at(speed)
-        mine = self._strides(choice[CONTROLLER], scenario, speed)
-        shown = _cut(mine, choice[STRIDES])
+        strides = self._strides(choice[CONTROLLER], scenario, speed)
+        shown = _cut(strides, choice[STRIDES])
         tracks = [*_pair(robot, gait, shown, look(choice[CONTROLLER]).label)]
         if choice[BESIDE] != ALONE:
-            second = mine if choice[BESIDE] == EARLIER else None
+            second = strides if choice[BESIDE] == EARLIER else None
             if second is None:
                 second = self._strides(choice[BESIDE], scenario, speed)
                 label = f"{look(choice[BESIDE]).label}, beside"
@@ -157,7 +157,7 @@ def _beside(track: Track) -> tuple[float, float, float] | None:
 
 
 def _windows(strides: xr.Dataset) -> list[str]:
-    """What the page offers to show of the strides."""
+    """Windows of strides that the page offers."""
     count = int(strides["count"].max())
     learned = bool((strides["learning"] == 1).any())
     starts = range(0, max(count - WINDOW, 0) + 1, WINDOW)
@@ -213,7 +213,7 @@ def _pair(robot: Robot, gait: Gait, strides: xr.Dataset, name: str) -> tuple[Tra
 
 @dataclass(frozen=True)
 class _Samples:
-    """Where the samples of some strides lie: on the phase grid, as far as each part lasted.
+    """Times of the samples of some strides: on the phase grid, as far as each part lasted.
 
     Attributes:
         since: Times since the beginning of the part [s], shape (strides, 2, samples).
@@ -270,12 +270,12 @@ class _Samples:
         clock = begin + timestep * np.arange(len(impulse))
         times = self.times
         before = np.maximum(times - FORCE_WINDOW, begin)
-        given = [
+        impulses = [
             np.interp(times, clock, column) - np.interp(before, clock, column)
             for column in impulse.T
         ]
         span = np.maximum(times - before, timestep)
-        forces = np.where(times < begin, np.nan, np.array(given) / span).T
+        forces = np.where(times < begin, np.nan, np.array(impulses) / span).T
         return np.asarray(forces.reshape(len(times), 4, 3))
 
 

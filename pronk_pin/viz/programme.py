@@ -1,4 +1,4 @@
-"""What a page can be asked to show: scenes by named options."""
+"""Menu of a page: scenes by named options."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Programme:
         return self.make(choice)
 
     def choices(self) -> Iterator[Choice]:
-        """What a file holds: the first choice, all values of one option, of two, and so on."""
+        """Choices that a file embeds: the first, all values of one option, of two, and so on."""
         yield self.first
         names = list(self.filed)
         for count, last in enumerate(names, start=1):

@@ -71,8 +71,8 @@ def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
     """The text of the file that `write_replay` writes."""
     if not 0.0 < real("fps", fps) <= 1000.0:
         raise InvalidInput(f"fps must be positive, not {fps}; and 1000 at most")
-    programme = Programme.of(shown)
-    first = programme.scene()
+    menu = Programme.of(shown)
+    first = menu.scene()
     frame = page(
         first.title,
         f"<script>{viewer_source()}</script>\n<script>{player_source()}</script>\n$start",
@@ -81,9 +81,9 @@ def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
     films: dict[str, str] = {}
     held: list[Choice] = []
     size = len(frame.encode()) + len(robot) + 2_000
-    for choice in programme.choices():
+    for choice in menu.choices():
         try:
-            scene = programme.scene(choice)
+            scene = menu.scene(choice)
         except InvalidInput:
             if not films:
                 raise
@@ -97,17 +97,17 @@ def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
     start = Template(_START).substitute(
         robot=robot,
         films=_json(films),
-        options=_json(_options(programme, held)),
-        first=_json(dict(programme.first)),
+        options=_json(_options(menu, held)),
+        first=_json(dict(menu.first)),
     )
     return frame.replace("$start", start, 1)
 
 
-def _options(programme: Programme, held: Sequence[Choice]) -> dict[str, list[str]]:
+def _options(menu: Programme, held: Sequence[Choice]) -> dict[str, list[str]]:
     """The values of each option that the file holds, in the programme's order."""
     return {
         name: [value for value in values if any(choice[name] == value for choice in held)]
-        for name, values in programme.options.items()
+        for name, values in menu.options.items()
     }
 
 

@@ -1,4 +1,4 @@
-"""What is shown: robots that move, on a ground that passes under them.
+"""Scenes: robots that move, on a ground that passes under them.
 
 A `Scene` is data. The live page, the file, pictures and films all show what its `rows` say.
 
@@ -36,7 +36,7 @@ VIEW_WINDOW = 0.6
 """Time over which the view averages the leader's position [s]: longer than a stride."""
 
 CHANNELS = ("forces", "error", "torque")
-"""What a track may hold beside its configurations."""
+"""Channels that a track may hold beside its configurations."""
 
 
 class Mark(NamedTuple):
@@ -98,7 +98,7 @@ class Track:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Which of `CHANNELS` it holds."""
+        """Names of the `CHANNELS` that the track holds."""
         return tuple(key for key in CHANNELS if getattr(self, key) is not None)
 
     def check(self, robot: Robot) -> None:
@@ -146,11 +146,11 @@ class Track:
         second[turned, 3:7] *= -1.0  # the same rotation, on the near side of the sphere
         q = (1.0 - w) * first + w * second
         q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
-        found = {"q": q}
+        values_at = {"q": q}
         for key in self.channels:
             values = getattr(self, key).reshape(len(self.t), -1)
-            found[key] = (1.0 - w) * values[before] + w * values[after]
-        return found
+            values_at[key] = (1.0 - w) * values[before] + w * values[after]
+        return values_at
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,20 +232,20 @@ class Scene:
         return t, smooth
 
     def view(self, times: Array) -> Array:
-        """Where the view is at some times [s]: x and y in the world [m], shape (m, 2)."""
+        """Position of the view at some times [s]: x and y in the world [m], shape (m, 2)."""
         t, path = self._path
         return np.stack([np.interp(times, t, path[:, i]) for i in (0, 1)], axis=-1)
 
     def rows(self, times: Array) -> list[dict[str, Array]]:
-        """What each track shows at some times [s], shape (m,).
+        """Values of each track at some times [s], shape (m,).
 
         Returns:
             For each track what `Track.at` gives, and the centres of the feet in the world [m],
             "feet" (m, 12).
         """
-        found = []
+        rows = []
         for track in self.tracks:
             row = track.at(times)
             row["feet"] = self.appearance.feet(row["q"]).reshape(len(times), -1)
-            found.append(row)
-        return found
+            rows.append(row)
+        return rows

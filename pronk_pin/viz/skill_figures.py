@@ -39,8 +39,8 @@ def gains_figure(table: pd.DataFrame) -> Figure:
         axes.set_xlabel("feedback gains, over the controller's own [%]")
         axes.set_ylabel("peak stance error [rad]")
     handles = [panel.get_legend_handles_labels() for panel in panels]
-    known = {label: handle for each in handles for handle, label in zip(*each, strict=True)}
-    legend_below(figure, known.values(), known)
+    entries = {label: handle for each in handles for handle, label in zip(*each, strict=True)}
+    legend_below(figure, entries.values(), entries)
     return figure
 
 
@@ -55,19 +55,19 @@ def transfers_figure(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(1, 2, sharey=True)
     place = np.arange(len(table))
     for axes, joint in zip(panels, SHOWN, strict=True):
-        practised = table[f"{joint}_practised"].to_numpy()
-        for row, (stored, anew) in enumerate(zip(table[joint], practised, strict=True)):
-            axes.plot([anew, stored], [row, row], color="0.75", lw=1.5, zorder=1)
-        axes.plot(practised, place, **_points("ilc", "practised there"))
+        relearned = table[f"{joint}_practised"].to_numpy()
+        for row, (stored, relearned_peak) in enumerate(zip(table[joint], relearned, strict=True)):
+            axes.plot([relearned_peak, stored], [row, row], color="0.75", lw=1.5, zorder=1)
+        axes.plot(relearned, place, **_points("ilc", "practised there"))
         for reuse, label in (
             (True, "stored skill: reuse"),
             (False, "stored skill: practise again"),
         ):
-            mine = (table["reuse"] == reuse).to_numpy()
+            chosen = (table["reuse"] == reuse).to_numpy()
             color = PALETTE["green"] if reuse else ACCENT
             style = {**_points("library", label), "color": color, "marker": "D" if reuse else "s"}
-            axes.plot(table[joint][mine], place[mine], **style)
-        limit = (1.0 + TOLERANCE) * practised
+            axes.plot(table[joint][chosen], place[chosen], **style)
+        limit = (1.0 + TOLERANCE) * relearned
         axes.plot(limit, place, "|", color="k", ms=8, label=f"{TOLERANCE:.0%} above practice")
         axes.set_xscale("log")
         low, high = axes.get_xlim()

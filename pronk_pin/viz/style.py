@@ -51,7 +51,7 @@ FORMATS = ("png", "svg", "pdf")
 
 @dataclass(frozen=True)
 class Look:
-    """How a controller is drawn.
+    """Colour, marker and line of a controller in figures.
 
     Attributes:
         label: Its name in words.
@@ -135,7 +135,7 @@ def styled(draw: Callable[_P, _T]) -> Callable[_P, _T]:
 
 
 def look(controller: str) -> Look:
-    """How a controller is drawn; one that has no look of its own gets one by its name."""
+    """Look of a controller in figures; one that has none of its own gets one by its name."""
     if controller in LOOKS:
         return LOOKS[controller]
     color, line, marker = _OTHERS[sum(controller.encode()) % len(_OTHERS)]

@@ -82,26 +82,28 @@ def _why_empty(row: pd.Series) -> str:
 
 
 @styled
-def practice_curves(practised: Mapping[str, list[Practice]], *, joint: str) -> Figure:
+def practice_curves(histories: Mapping[str, list[Practice]], *, joint: str) -> Figure:
     """Peak error over the strides of learning in every world, with the model's level as a line.
 
     Means over the robots that did not fall; the band is from the first to the third quartile.
 
     Args:
-        practised: The simulations of each world.
+        histories: The simulations of each world.
         joint: "calf" or "thigh".
     """
-    rows = -(-len(practised) // _COLUMNS)
-    columns = min(_COLUMNS, len(practised))
+    rows = -(-len(histories) // _COLUMNS)
+    columns = min(_COLUMNS, len(histories))
     figure = new_figure(TWO_COLUMNS, 0.5 + 1.45 * rows)
     panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
-    for axes in panels.ravel()[len(practised) :]:
+    for axes in panels.ravel()[len(histories) :]:
         axes.set_visible(False)
     handles: dict[str, object] = {}
-    for axes, (scenario, simulations) in zip(panels.ravel(), practised.items(), strict=False):
-        for controller in in_order(str(one.settings["controller"]) for one in simulations):
-            mine = [one for one in simulations if one.settings["controller"] == controller]
-            line = _draw(axes, mine, SHOWN.index(joint), controller)
+    for axes, (scenario, simulations) in zip(panels.ravel(), histories.items(), strict=False):
+        for controller in in_order(str(history.settings["controller"]) for history in simulations):
+            of_controller = [
+                history for history in simulations if history.settings["controller"] == controller
+            ]
+            line = _draw(axes, of_controller, SHOWN.index(joint), controller)
             if line is not None:
                 handles[look(controller).label] = line
         axes.set_title(scenario)
@@ -149,11 +151,11 @@ def by_world(table: pd.DataFrame) -> Figure:
 def _draw(axes: Axes, simulations: list[Practice], joint: int, controller: str) -> object:
     """One controller: a curve if it learns, a level if it is PD or the model."""
     style = look(controller)
-    upright = [one.upright == 1 for one in simulations]
+    upright = [history.upright == 1 for history in simulations]
     curves = [
         peaks[:_STRIDES, joint]
-        for one, up in zip(simulations, upright, strict=True)
-        for peaks, stands in zip(one.learning, up, strict=True)
+        for history, up in zip(simulations, upright, strict=True)
+        for peaks, stands in zip(history.learning, up, strict=True)
         if stands and len(peaks)
     ]
     if curves:
@@ -166,6 +168,6 @@ def _draw(axes: Axes, simulations: list[Practice], joint: int, controller: str) 
     if controller not in ("pd", RIVAL):
         return None
     levels = np.concatenate(
-        [one.level[up, joint] for one, up in zip(simulations, upright, strict=True)]
+        [history.level[up, joint] for history, up in zip(simulations, upright, strict=True)]
     )
     return axes.axhline(levels.mean(), **style.curve) if levels.size else None

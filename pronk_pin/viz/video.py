@@ -23,7 +23,7 @@ from .scene import Scene
 
 @dataclass(frozen=True)
 class Film:
-    """What pictures and films are like.
+    """Size, rate and time of pictures and films.
 
     Attributes:
         width: Width of the picture [pixels].
@@ -65,8 +65,8 @@ class Film:
 
     def times(self, duration: float) -> list[float]:
         """The instants of the film of a scene of that duration [s], from its beginning."""
-        left = max(duration - self.at, 0.0)
-        shown = left if self.seconds is None else min(self.seconds, left)
+        remaining = max(duration - self.at, 0.0)
+        shown = remaining if self.seconds is None else min(self.seconds, remaining)
         count = max(int(shown / self.rate * self.fps + 1e-9), 1)
         return [self.at + k * self.rate / self.fps for k in range(count)]
 

@@ -1,4 +1,4 @@
-"""What did it learn? The learned torque, taken apart into physics."""
+"""Identification: the learned torque decomposed into physical causes, with parameters."""
 
 from .describe import describe, foreign, words
 from .explain import Explanation, explain

@@ -1,4 +1,4 @@
-"""An explanation in words and tables, for a terminal and for comments of files."""
+"""Text of an explanation: tables and remarks, for a terminal and for comments of files."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ FEW_STRIDES = 6
 WIDE = 0.05
 """Half an interval over the term's scale from which on a confounded pair is not told apart."""
 FOREIGN = 2.0
-"""What no term describes, over the strides' noise, from which on something else is at work."""
+"""Ratio of the residual to the strides' noise from which on something else is at work."""
 _LEAST = np.array([1.0, 1.0, 0.05, 0.05, 0.05])
-"""What is too small to matter, by group [N, N, N m, N m, N m]."""
+"""Residuals too small to matter, by group [N, N, N m, N m, N m]."""
 SINKING = 0.005
 """Depth from which on the ground gives way [m]; a stiff one takes 2.5 mm in a landing."""
 SLOPE = np.radians(1.0)
@@ -33,7 +33,7 @@ _UNITS = {"x": "N", "z": "N"}
 
 
 def describe(explanation: Explanation) -> str:
-    """Tables of the parameters and of the shares, and the words."""
+    """Format the tables of the parameters and of the shares, and the remarks."""
     return "\n\n".join(
         [
             format_parameters(explanation),
@@ -44,7 +44,7 @@ def describe(explanation: Explanation) -> str:
 
 
 def format_parameters(explanation: Explanation) -> str:
-    """The parameters with their intervals, and the truth where it is known."""
+    """Format the parameters with their intervals, and their true values where known."""
     table = explanation.table()
     known = bool(table["true"].notna().any())
     lines = [
@@ -65,7 +65,7 @@ def format_parameters(explanation: Explanation) -> str:
 
 
 def format_shares(explanation: Explanation) -> str:
-    """How much of the difference between learned and model torque each cause explains."""
+    """Format the shares of the causes in the difference between learned and model torque."""
     table, fit = explanation.share_table, explained(explanation.shares)
     found = explanation.shares
     size = discrepancy(found) ** 2
@@ -92,7 +92,7 @@ def format_shares(explanation: Explanation) -> str:
 
 
 def words(explanation: Explanation) -> list[str]:
-    """What a number alone would not say."""
+    """Remarks on the data, the residual, internal forces, the ground and confounding."""
     return [
         *_of_the_strides(explanation),
         *_of_the_rest(explanation),
@@ -139,7 +139,7 @@ def _of_the_rest(explanation: Explanation) -> Iterator[str]:
 
 
 def foreign(explanation: Explanation) -> dict[str, float]:
-    """What no term describes and noise does not explain, by group of rows; empty if nothing."""
+    """Residuals that noise does not explain, by group of rows; empty if none."""
     fit = explanation.estimate
     beyond = (fit.rest > FOREIGN * fit.noise) & (fit.rest > _LEAST)
     return {group: float(fit.rest[k]) for k, group in enumerate(GROUPS) if beyond[k]}

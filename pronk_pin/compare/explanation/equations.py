@@ -35,7 +35,7 @@ WINDOW = 0.02
 _EVERY = 0.004
 """Distance of the rows [s]: a fifth of the window holds all that it lets through."""
 _SETTLED = {"stance": (0.002, 0.002), "flight": (0.03, 0.012)}
-"""What is left out at the beginning and the end of a phase [s]: feet that have not left the ground
+"""Times left out at the beginning and the end of a phase [s]: feet that have not left the ground
 yet in flight, or touch it before it is felt."""
 _STICKING = 0.2
 """Joint velocity below which friction may hold the joint, which no term describes [rad/s]."""
@@ -43,7 +43,7 @@ _STICKING = 0.2
 GROUPS = ("x", "z", "hip", "thigh", "calf")
 """Kinds of rows: balance of forces along x and z in stance [N], joints in flight [N m]."""
 _JOINTS = 2
-"""Where the joints begin among the groups."""
+"""Index of the first joint among the groups."""
 _GUIDED = (0, 2)
 """Rows of the trunk that a locked base leaves free: x and z."""
 
@@ -54,11 +54,11 @@ class PhaseForces(NamedTuple):
     recording: PhaseRecording
     """The phase."""
     known: Array
-    """What the motors gave beyond what the URDF's motion needs, shape (k, ticks, 18)."""
+    """`S tau - rnea(q, v, a)`: forces beyond those that the URDF's motion needs, (k, ticks, 18)."""
     columns: Array
-    """What a unit of each term makes of it, shape (k, ticks, 18, terms)."""
+    """Generalised force of a unit of each term, shape (k, ticks, 18, terms)."""
     lean: Array
-    """What of that motion's forces is gravity's that pulls otherwise than the model's, mean over
+    """Generalised force of the difference between true and model gravity, mean over
     the strides, shape (ticks, 18)."""
     balance: Array | None
     """In stance, combinations of the equations that contact forces do not enter, shape
@@ -69,9 +69,9 @@ class Equations(NamedTuple):
     """Rows `y = A theta` of one speed, for each of its strides."""
 
     y: Array
-    """What the motors gave beyond what the URDF's motion needs [N or N m], shape (k, m)."""
+    """Forces beyond those that the URDF's motion needs [N or N m], shape (k, m)."""
     A: Array
-    """What a unit of each term would make of it, shape (k, m, terms)."""
+    """Force of a unit of each term, shape (k, m, terms)."""
     group: IntArray
     """Kind of each row, index into `GROUPS`, shape (m,)."""
 
@@ -124,7 +124,7 @@ def _rows(robot: Robot, forces_: PhaseForces) -> Equations:
 
 
 def forces(robot: Robot, motion: Motion, terms: tuple[Term, ...]) -> tuple[Array, Array]:
-    """What the motors give beyond what the URDF's motion needs (n, 18), and the terms' columns
+    """Residual `S tau - rnea(q, v, a)` of the URDF (n, 18), and the terms' columns
     (n, 18, terms)."""
     known = np.zeros_like(motion.v)
     known[:, NB:] = motion.tau
@@ -135,7 +135,7 @@ def forces(robot: Robot, motion: Motion, terms: tuple[Term, ...]) -> tuple[Array
 
 
 def _weight(robot: Robot, q: Array, lean: Array) -> Array:
-    """What it takes to bear the trunk's acceleration along x and z, shape (n, 18)."""
+    """Generalised force `M [:, (x, z)] a` of an acceleration of x and z, shape (n, 18)."""
     if not lean.any():
         return np.zeros((len(q), robot.nv))
     return np.array([mass_matrix(robot, each)[:, list(_GUIDED)] @ lean for each in q])

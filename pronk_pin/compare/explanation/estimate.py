@@ -1,4 +1,4 @@
-"""From rows `y = A theta` to parameters with intervals, and a word on what cannot be told apart.
+"""Estimation of parameters with intervals from rows `y = A theta`, and their confounding.
 
 Noise in the measured motion is noise in A, and least squares on noisy regressors are biased. So the
 normal equations are made of pairs of different strides,
@@ -219,8 +219,10 @@ def _solve(G: Array, b: Array, terms: tuple[Term, ...]) -> Array:
 
 
 def repetition(rows: Equations, terms: tuple[Term, ...]) -> float:
-    """How alike the strides are: what a stride's rows share with another's, over its own; 1 if they
-    repeat, lower by noise, and near 0 where the robot stumbles."""
+    """Repetition of strides: median over the terms of `mean_{j != k} A_j^T A_k / mean_j A_j^T A_j`.
+
+    1 if they repeat, lower by noise, and near 0 where the robot stumbles.
+    """
     scale = np.array([term.scale for term in terms])
     normal = _normal(rows, np.ones(len(rows.group)), scale)
     own = np.einsum("jjpp->p", normal.G)
@@ -248,7 +250,7 @@ _UNSEEN = 1e-6
 
 
 def confounding(estimate_: Estimate) -> Confounding:
-    """What the rows do not tell apart."""
+    """Find the terms that the rows do not tell apart."""
     G = estimate_.information
     diagonal = np.diag(G)
     seen = diagonal > np.maximum(_UNSEEN * diagonal.max(), PRIOR**-2)

@@ -1,4 +1,4 @@
-"""What did it learn? From the strides of a simulation to an `Explanation`."""
+"""Identification from a result: an `Explanation` of the learned torque."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ REPEATS = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """The learned torque, taken apart, and the model that it makes.
+    """The learned torque by cause, and the identified model.
 
     Attributes:
         robot: The robot as its URDF has it.
@@ -73,12 +73,12 @@ class Explanation:
 
     @cached_property
     def mended(self) -> Robot:
-        """The robot with what practice found."""
+        """The robot with the identified parameters."""
         return self.robot.with_parameters(self.parameters)
 
     @property
     def share_table(self) -> xr.DataArray:
-        """How much of the discrepancy each cause explains, see `share_table`."""
+        """Share of the discrepancy by cause, see `share_table`."""
         return share_table(self.shares)
 
     def table(self) -> pd.DataFrame:
@@ -108,7 +108,7 @@ def explain(
     draws: int = 300,
     rng: np.random.Generator | None = None,
 ) -> Explanation:
-    """Take the torque that was learned apart into what the model lacks.
+    """Identify what the model lacks from the torque that was learned.
 
     Args:
         strides: The strides of one cell, as `Results.strides` reads them.

@@ -1,4 +1,4 @@
-"""What feet and IMU tell of the ground: whether it gives way, and whether it slopes.
+"""Survey of the ground by feet and IMU: sinking, slope and gravity.
 
 A trunk that is held level climbs a slope; one that is held along it feels gravity lean back.
 """
@@ -21,7 +21,7 @@ _UPRIGHT = 0.005
 
 
 class Ground(NamedTuple):
-    """The ground as the feet found it, mean over speeds."""
+    """Properties of the ground, estimated from the feet, mean over speeds."""
 
     sinking: float
     """By how much the feet sink in after touchdown [m]."""
@@ -33,7 +33,7 @@ class Ground(NamedTuple):
 
 
 def survey(robot: Robot, stances: Iterable[PhaseRecording]) -> Ground:
-    """Look at the feet of recorded stances.
+    """Estimate sinking, slope and gravity from recorded stances.
 
     Args:
         robot: The robot.

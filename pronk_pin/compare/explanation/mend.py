@@ -1,4 +1,4 @@
-"""Gaits optimised again with the mended model."""
+"""Gaits optimised again with the identified model."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...robot import Robot
 
 
 def mended_gaits(robot: Robot, gaits: Sequence[Gait]) -> list[Gait]:
-    """Gaits of the same speeds and heights, optimised again for a robot with its parameters.
+    """Optimise gaits of the same speeds and heights again, for a robot with its parameters.
 
     With rotors the legs bring other momentum to the ground and land otherwise: what was a gait of
     the URDF's robot is none of theirs. Each starts from its neighbour's solution, the slowest from

@@ -150,7 +150,7 @@ def recordings(
 
 
 def _lean(strides: xr.Dataset) -> Array:
-    """What an IMU has besides the acceleration of the place, as the simulated world has it."""
+    """Model's gravity less the simulated world's, along x and z [m/s^2], shape (2,)."""
     model = load_robot(strides.attrs["robot"]).model.gravity.linear
     try:
         world = Scenario.from_json(strides.attrs["scenario_parameters"]).gravity_vector

@@ -1,4 +1,4 @@
-"""How much of the learned torque each cause explains, joint by joint and over the phase.
+"""Decomposition of the learned torque by cause, joint by joint and over the phase.
 
 With the mean of the recorded strides, and the model's torque along the reference,
 
@@ -46,7 +46,7 @@ def shares(
     value: Array,
     terms: tuple[Term, ...],
 ) -> xr.Dataset:
-    """Take the learned torques apart.
+    """Decompose the learned torques by cause.
 
     Args:
         robot: The robot as its URDF has it.
@@ -161,16 +161,16 @@ def _on_grid(phase: PhaseForces, values: Array, planned: float) -> Array:
 
 
 def share_table(found: xr.Dataset) -> xr.DataArray:
-    """How much of the discrepancy each cause explains, by part and kind of joint; sums to 1.
+    """Share `<tau_cause, d> / <d, d>` of the discrepancy d by cause, part and kind of joint.
 
-    The cause's torque times the discrepancy over the discrepancy's square, both summed over
-    speeds, legs and phases outside the bounce: negative where a cause works against it.
+    Sums are over speeds, legs and phases outside the bounce. Shares sum to 1 over the causes; they
+    are negative where a cause works against the discrepancy.
     """
     return _projected(found, found["torque"])
 
 
 def feedback_share(found: xr.Dataset) -> xr.DataArray:
-    """How much of the discrepancy feedback still gave, by part and kind of joint."""
+    """Share of the discrepancy that feedback still gave, by part and kind of joint."""
     return _projected(found, found["feedback"])
 
 
@@ -185,8 +185,8 @@ def _projected(found: xr.Dataset, torque: xr.DataArray) -> xr.DataArray:
 
 
 def explained(found: xr.Dataset) -> xr.DataArray:
-    """R^2 by part and kind of joint: 1 less the square of the unexplained over the discrepancy's,
-    outside the bounce after touchdown."""
+    """R^2 = 1 - |unexplained|^2 / |discrepancy|^2 by part and kind of joint, outside the bounce
+    after touchdown."""
     rest, over = _settled(found, found["torque"].sel(cause="unexplained")), ("speed", "phase")
     return 1.0 - _by_kind(rest**2).sum(over) / _by_kind(discrepancy(found) ** 2).sum(over)
 

@@ -1,4 +1,4 @@
-"""What a model may lack, term by term: the force that a unit of each would make along a motion.
+"""Terms that a model may lack: the generalised force of a unit of each along a motion.
 
 Everything is linear: with the parameters theta of the terms,
 
@@ -25,7 +25,7 @@ from ..scenario import Scenario
 
 
 class Motion(NamedTuple):
-    """What a robot did and was told at n instants, in Pinocchio's layout."""
+    """Recorded motion and commanded torques at n instants, in Pinocchio's layout."""
 
     q: Array
     """Configurations, shape (n, 19)."""
@@ -38,7 +38,7 @@ class Motion(NamedTuple):
     direction: Array
     """Their signs, from less noisy velocities, between -1 and 1, shape (n, 12)."""
     tau: Array
-    """Torques that the motors were told [N m], shape (n, 12)."""
+    """Commanded torques of the motors [N m], shape (n, 12)."""
     tau_rate: Array
     """Their rates of change [N m/s], shape (n, 12)."""
 
@@ -48,7 +48,7 @@ Column = Callable[[Robot, Motion], Array]
 
 @dataclass(frozen=True)
 class Term:
-    """Something that the model may lack.
+    """A term that the model may lack: one linear parameter.
 
     Attributes:
         name: Its name, as in tables.
@@ -171,7 +171,7 @@ TERMS: tuple[Term, ...] = (
 
 
 def parameters(values: Mapping[str, float], robot: Robot) -> ModelParameters:
-    """What the terms' parameters say of a robot, as `Robot.with_parameters` takes it.
+    """Convert the terms' parameters to those that `Robot.with_parameters` takes.
 
     Only of the terms that are given: the load sits where `ModelParameters` has it by default if its
     moments are not, and without a load the moments shift the trunk's own centre of mass. A delay
