@@ -29,8 +29,9 @@ from .._typing import Array
 from .._workers import follow_parent
 from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
 from ..robot import Robot, RobotSpec, load_robot
+from ..storage import read_arrays, write_arrays
 from .audit import audit, bezier_orders
-from .library import DAMAGE, SCHEMA, GaitLibrary, from_arrays, to_arrays, write_arrays
+from .library import PER_GAIT, SCHEMA, GaitLibrary, from_arrays, to_arrays
 from .optimize import GaitSolution, SolverState, optimize_gait
 from .problem import Base, GaitProblem
 from .style import gait_problem, load_style
@@ -284,7 +285,7 @@ def _work(task: _Task, start: Path | None) -> None:
     arrays = to_arrays(GaitLibrary((solution.gait,), metadata, (found,)))
     arrays |= {"x": state.x, "lam_x": state.lam_x, "lam_g": state.lam_g}
     arrays["fingerprint"] = np.array(task.problem.fingerprint())
-    write_arrays(task.path, arrays)
+    write_arrays(task.path, arrays, schema=SCHEMA, remedy="choose another folder")
 
 
 def _solve(problem: GaitProblem, neighbour: _Solved | None) -> GaitSolution:
@@ -303,26 +304,23 @@ def _read(task: _Task) -> _Solved:
     Raises:
         FileProblem: It is damaged, or holds a gait of another problem.
     """
-    path = task.path
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        if int(arrays["schema"]) != SCHEMA:
-            raise FileProblem(path, f"schema {arrays['schema']}, not {SCHEMA}", _AGAIN)
-        fingerprint = str(arrays["fingerprint"])
-        state = SolverState(*(np.array(arrays[key]) for key in ("x", "lam_x", "lam_g")))
-        if not all(np.all(np.isfinite(part)) for part in (state.x, state.lam_x, state.lam_g)):
-            raise ValueError("the solver's state is not finite")
-        solved = _Solved(from_arrays(arrays), state)
-    except (*DAMAGE, InvalidInput) as error:
-        raise FileProblem(path, f"damaged gait ({error})", _AGAIN) from error
-    if fingerprint != task.problem.fingerprint():
+    arrays = read_arrays(task.path, _AGAIN, what="gait", schema=SCHEMA)
+    if arrays.text("fingerprint") != task.problem.fingerprint():
         raise FileProblem(
-            path,
+            task.path,
             "a gait of another problem (robot, base, sequence, bounds or weights)",
             "choose another folder, or delete this one",
         )
-    return solved
+    library = from_arrays(arrays)
+    state = SolverState(*(arrays.numbers(name, None) for name in ("x", "lam_x", "lam_g")))
+    kept = library.metadata
+    if (
+        len(library.gaits) != 1
+        or len(library.audit) != 1
+        or not {*PER_GAIT, "bezier_orders"} <= {*kept}
+    ):
+        raise arrays.damaged("it is not of one gait, with its audit")
+    return _Solved(library, state)
 
 
 def _library(

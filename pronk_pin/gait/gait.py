@@ -6,8 +6,11 @@ on all four feet, then `flight` on none; the touchdown impact closes the cycle.
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -72,7 +75,7 @@ def planar_state(
 
 @dataclass(frozen=True)
 class GaitPhase:
-    """One phase of a gait.
+    """One phase of a gait; its arrays are read-only.
 
     Attributes:
         name: Its name in the contact sequence: "stance" or "flight" in pronking.
@@ -92,6 +95,13 @@ class GaitPhase:
     base: Array
     tau: Array
     lam: Array
+
+    def __post_init__(self) -> None:
+        # An audit is of these numbers; who wants others makes a phase of them.
+        for name in ARRAYS:
+            coefficients = np.asarray(getattr(self, name), dtype=np.float64).view()
+            coefficients.flags.writeable = False
+            object.__setattr__(self, name, coefficients)
 
     def joint_reference(self, s: Array) -> tuple[Array, Array]:
         """Joint angles [rad] and velocities [rad/s] at the phases s, each of shape (n, 12)."""
@@ -141,6 +151,20 @@ class Gait:
     speed: float
     apex: float
     phases: tuple[GaitPhase, ...]
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the motion: its robot's name and all of its numbers, to the last bit."""
+        phases = [
+            [phase.name, phase.feet, float(phase.duration).hex(), phase.joints.shape]
+            for phase in self.phases
+        ]
+        head = [self.robot, float(self.speed).hex(), float(self.apex).hex(), phases]
+        digest = hashlib.sha256(json.dumps(head).encode())
+        for phase in self.phases:
+            for name in ARRAYS:
+                digest.update(getattr(phase, name).astype("<f8").tobytes())
+        return digest.hexdigest()
 
     def phase(self, name: str) -> GaitPhase:
         """The phase of that name."""
