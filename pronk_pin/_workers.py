@@ -1,22 +1,48 @@
-"""What every worker process of ours does first."""
+"""What every worker process of ours does first.
+
+It imports the standard library only: a worker is to watch its parent before it imports the rest of
+this package, which takes seconds.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import signal
+import tempfile
 import threading
 from multiprocessing import connection
+from multiprocessing.sharedctypes import Synchronized
+
+_steps_done: Synchronized[int] | None = None
 
 
-def follow_parent() -> None:
-    """Leave Ctrl-C to the parent process, and end when it ends."""
+def begin_worker(folder: str, counter: Synchronized[int] | None = None) -> None:
+    """Set a worker up: it leaves Ctrl-C to the parent, ends when that ends, and counts its steps.
+
+    Args:
+        folder: A folder of the parent's for temporary files: workers are ended without notice,
+            and could not clear away what they have in a place of their own.
+        counter: Robot-steps done by all workers; None where nobody asks.
+    """
+    global _steps_done
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tempfile.tempdir = folder
+    _steps_done = counter
     parent = multiprocessing.parent_process()
     assert parent is not None
 
     def follow() -> None:
         connection.wait([parent.sentinel])
+        shutil.rmtree(folder, ignore_errors=True)
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
+
+
+def count_steps(steps: int) -> None:
+    """Tell how many more robot-steps are done, if this process is a worker that counts them."""
+    if _steps_done is not None:
+        with _steps_done.get_lock():
+            _steps_done.value += steps

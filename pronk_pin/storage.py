@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import functools
 import hashlib
 import io
 import itertools
@@ -20,6 +21,7 @@ import math
 import os
 import re
 import stat
+import tempfile
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -27,17 +29,24 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
+import msgspec.inspect
 import numpy as np
 import numpy.typing as npt
 
 from ._typing import Array
-from .errors import FileProblem, PronkError, cannot_write
+from .errors import FileProblem, InvalidInput, PronkError, cannot_write
 
 LARGEST_FILE = 2**30
 """Size beyond which no file of ours is read [bytes]; a comparison makes some of 3 % of it."""
 
 LARGEST_ARRAYS = 2**28
 """Size beyond which the arrays of an `.npz` are not unpacked [bytes]."""
+
+LARGEST_DOCUMENT = 2**24
+"""Size beyond which no XML is read [bytes]; robots have a hundred kilobytes."""
+
+_DEEPEST = 200
+"""Elements within elements beyond which no XML is read: libraries in C follow them by recursion."""
 
 _PARTIAL = re.compile(r"\..+\.(\d+)-\d+\.partial(\.\w+)?")
 _counter = itertools.count()
@@ -123,10 +132,30 @@ def partial_path(
     try:
         target = Path(os.path.realpath(path))
         target.parent.mkdir(parents=True, exist_ok=True)
-        with _neighbour(target, target.suffix) as partial:
-            yield partial
     except (OSError, ValueError) as error:
         raise cannot_write(path, error, remedy) from error
+    try:
+        with _neighbour(target, target.suffix) as partial:
+            yield partial
+    except OSError as error:
+        raise cannot_write(path, error, remedy) from error
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder for temporary files, which is gone at the end of the block.
+
+    Raises:
+        FileProblem: It cannot be made.
+    """
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="pronk-pin-", ignore_cleanup_errors=True)
+    except OSError as error:
+        place = tempfile.tempdir or os.environ.get("TMPDIR", "/tmp")
+        remedy = "make room for temporary files, or set TMPDIR"
+        raise cannot_write(place, error, remedy) from error
+    with folder as name:
+        yield Path(name)
 
 
 def clear_partial_files(folder: Path) -> None:
@@ -203,18 +232,39 @@ def read_bytes(path: Path | str, remedy: str, *, limit: int = LARGEST_FILE) -> b
         FileProblem: It is missing, no regular file, too large, or the system cannot read it.
     """
     path = Path(path)
+    check_file(path, remedy, limit=limit)
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error, remedy) from error
+
+
+def check_file(path: Path, remedy: str, *, limit: int = LARGEST_FILE) -> None:
+    """Refuse what is no regular file, before a library waits for it.
+
+    Args:
+        path: The file.
+        remedy: What to do where it is missing or too large.
+        limit: Largest size [bytes].
+
+    Raises:
+        FileProblem: It is missing, no regular file, or too large.
+    """
     try:
         status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise FileProblem(path, "is not a file", remedy)
-        if status.st_size > limit:
-            raise FileProblem(path, f"is too large ({status.st_size / 1e6:.0f} MB)", remedy)
-        return path.read_bytes()
-    except FileNotFoundError as error:
-        raise FileProblem(path, "missing", remedy) from error
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileProblem(path, f"cannot be read ({reason})", remedy) from error
+        raise _unreadable(path, error, remedy) from error
+    if not stat.S_ISREG(status.st_mode):
+        raise FileProblem(path, "is not a file", remedy)
+    if status.st_size > limit:
+        raise FileProblem(path, f"is too large ({status.st_size / 1e6:.0f} MB)", remedy)
+
+
+def _unreadable(path: Path, error: Exception, remedy: str) -> FileProblem:
+    if isinstance(error, FileNotFoundError):
+        return FileProblem(path, "missing", remedy)
+    reason = getattr(error, "strerror", None) or error
+    return FileProblem(path, f"cannot be read ({reason})", remedy)
 
 
 def read_text(path: Path | str, remedy: str, *, limit: int = LARGEST_FILE) -> str:
@@ -245,9 +295,40 @@ def read_xml(path: Path | str, remedy: str, *, what: str = "") -> ElementTree.El
     Raises:
         FileProblem: It cannot be read, or is no XML.
     """
-    data = read_bytes(path, remedy)
+    return parse_xml(read_bytes(path, remedy, limit=LARGEST_DOCUMENT), path, remedy, what=what)
+
+
+def parse_xml(data: bytes, path: Path | str, remedy: str, *, what: str = "") -> ElementTree.Element:
+    """The root of the tree of an XML document that was read from a file.
+
+    Raises:
+        FileProblem: It is no XML, or is nested too deeply, or declares a document type, by which
+            a short document may become a long one.
+    """
     with reading(path, remedy, what=what):
-        return ElementTree.fromstring(data)
+        parser = ElementTree.XMLParser(target=_Builder())
+        parser.feed(data)
+        root: ElementTree.Element = parser.close()
+        return root
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Builds trees that are not too deep."""
+
+    _depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ElementTree.Element:
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise ValueError(f"more than {_DEEPEST} elements within one another")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise ValueError("it declares a document type")
 
 
 class StoredArrays(dict[str, npt.NDArray[Any]]):
@@ -472,13 +553,66 @@ def as_type(
         raise damaged(path, error, remedy, what=what) from error
 
 
-def unknown_fields(document: object, kind: type[Any]) -> None:
-    """Refuse fields that a dataclass does not have, at its first level."""
-    fields = getattr(kind, "__dataclass_fields__", None)
-    if fields is not None and isinstance(document, dict):
-        strangers = [str(name) for name in document if name not in fields]
-        if strangers:
-            raise msgspec.ValidationError(f"unknown field {', '.join(strangers)}")
+def from_text(text: str, kind: type[_T], what: str, remedy: str) -> _T:
+    """What JSON says that one of our own dataclasses was written to with everything in it.
+
+    Args:
+        text: The text.
+        kind: The dataclass; a field too few is refused as one too many.
+        what: What the text should be, as in "a scenario".
+        remedy: How to come by it, as in "make the strides again".
+
+    Raises:
+        InvalidInput: The text is something else.
+        PronkError: What the dataclass itself raises for values that are out of range.
+    """
+    try:
+        document = json.loads(text)
+        unknown_fields(document, kind, complete=True)
+        return msgspec.convert(document, kind)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(f"this is not {what} ({error}); {remedy}") from error
+
+
+def unknown_fields(document: object, kind: Any, *, complete: bool = False) -> None:
+    """Refuse fields that a dataclass, or one within it, does not have.
+
+    Args:
+        document: Lists, dictionaries, strings, numbers.
+        kind: The dataclass, or another type.
+        complete: Refuse missing fields too, even those that have a default.
+    """
+    _compare_fields(document, _type_info(kind), complete)
+
+
+@functools.lru_cache(maxsize=64)
+def _type_info(kind: Any) -> msgspec.inspect.Type:
+    return msgspec.inspect.type_info(kind)
+
+
+def _compare_fields(document: object, info: msgspec.inspect.Type, complete: bool) -> None:
+    inspect = msgspec.inspect
+    if isinstance(info, inspect.UnionType):
+        structured = [part for part in info.types if not isinstance(part, inspect.NoneType)]
+        if len(structured) == 1:
+            _compare_fields(document, structured[0], complete)
+    elif isinstance(info, inspect.DataclassType) and isinstance(document, dict):
+        fields = {field.name: field.type for field in info.fields}
+        for strangers, word in [
+            (document.keys() - fields.keys(), "unknown"),
+            (fields.keys() - document.keys() if complete else set(), "missing"),
+        ]:
+            if strangers:
+                listed = ", ".join(sorted(map(str, strangers)))
+                raise msgspec.ValidationError(f"{word} field {listed}")
+        for name, part in document.items():
+            _compare_fields(part, fields[name], complete)
+    elif isinstance(info, inspect.ListType | inspect.VarTupleType) and isinstance(document, list):
+        for part in document:
+            _compare_fields(part, info.item_type, complete)
+    elif isinstance(info, inspect.DictType) and isinstance(document, dict):
+        for part in document.values():
+            _compare_fields(part, info.value_type, complete)
 
 
 def sha256(data: bytes | str) -> str:

@@ -12,12 +12,11 @@ import importlib.metadata
 import multiprocessing
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,10 +25,10 @@ import numpy as np
 from tqdm import tqdm
 
 from .._typing import Array
-from .._workers import follow_parent
+from .._workers import begin_worker
 from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
 from ..robot import Robot, RobotSpec, load_robot
-from ..storage import read_arrays, write_arrays
+from ..storage import clear_partial_files, read_arrays, temporary_folder, write_arrays
 from .audit import audit, bezier_orders
 from .library import PER_GAIT, SCHEMA, GaitLibrary, from_arrays, to_arrays
 from .optimize import GaitSolution, SolverState, optimize_gait
@@ -127,10 +126,16 @@ class _Task:
 @contextmanager
 def _folder(folder: Path | str | None) -> Iterator[Path]:
     if folder is not None:
-        yield Path(folder)
+        clear_partial_files(Path(folder))
+        try:
+            yield Path(folder)
+        except BaseException:
+            with suppress(FileProblem):  # workers that were ended leave half of a file
+                clear_partial_files(Path(folder))
+            raise
         return
-    with tempfile.TemporaryDirectory(prefix="pronk-pin-gaits-") as temporary:
-        yield Path(temporary)
+    with temporary_folder() as temporary:
+        yield temporary
 
 
 def _home(apexes: Sequence[float] | Array, wanted: float) -> float:
@@ -229,7 +234,12 @@ def _in_processes(
     """Gaits in a pool of processes; each waits for the neighbour that it starts from."""
     context = multiprocessing.get_context("spawn")
     running: dict[Future[None], Key] = {}
-    with ProcessPoolExecutor(workers, context, initializer=follow_parent) as pool:
+    with (
+        temporary_folder() as folder,
+        ProcessPoolExecutor(
+            workers, context, initializer=begin_worker, initargs=(str(folder),)
+        ) as pool,
+    ):
         try:
             while waiting or running:
                 for key in [k for k in waiting if parents[k] is None or parents[k] in done]:
