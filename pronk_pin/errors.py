@@ -5,8 +5,7 @@ Each class carries what is needed to investigate, and its message names the reme
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -41,20 +40,6 @@ class UnknownName(PronkError):
 
 class InvalidInput(PronkError):
     """An argument of the wrong shape, type or range; the message says what is expected."""
-
-
-@contextmanager
-def reading(kind: str, remedy: str) -> Iterator[None]:
-    """Around the reading of stored text: what it lacks or has otherwise is an `InvalidInput`.
-
-    Args:
-        kind: What the text should be, as in "a scenario".
-        remedy: How to come by it, as in "make the strides again".
-    """
-    try:
-        yield
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInput(f"this is not {kind} ({error}); {remedy}") from error
 
 
 class SpeedOutOfRange(PronkError):

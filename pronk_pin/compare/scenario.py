@@ -17,7 +17,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..errors import InvalidInput, UnknownName, reading
+from ..errors import InvalidInput, UnknownName
+from ..storage import from_text
 from .mismatch import KNOWN, ROTOR
 from .sensors import Sensors
 
@@ -126,10 +127,7 @@ class Scenario:
         Raises:
             InvalidInput: The text is something else.
         """
-        with reading("a scenario", "make the strides again"):
-            values = json.loads(text)
-            vectors = {name: tuple(values[name]) for name in _VECTORS}
-            return cls(**{**values, **vectors, "sensors": Sensors(**values["sensors"])})
+        return from_text(text, cls, "a scenario", "make the strides again")
 
     def _check_ground(self) -> None:
         if not self.ground_time_constant >= 2 * self.timestep:

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
-from ..errors import InvalidInput, cannot_write
+from ..errors import InvalidInput
+from ..storage import write_file
 from .documents import FPS, film_blob, robot_blob
 from .page import page, player_source, viewer_source
 from .programme import Choice, Programme
@@ -54,14 +55,7 @@ def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS
         FileProblem: The file cannot be written.
         InvalidInput: fps is not positive.
     """
-    path = Path(path)
-    html = replay_html(shown, fps=fps)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(html, encoding="utf-8")
-    except OSError as error:
-        raise cannot_write(path, error, "choose another path") from error
-    return path
+    return write_file(path, replay_html(shown, fps=fps), remedy="choose another path")
 
 
 def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
