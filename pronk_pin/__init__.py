@@ -1,8 +1,35 @@
 """When a legged robot repeats a motion, does practice beat the model?"""
 
+import importlib
+from typing import TYPE_CHECKING
+
 from .errors import PronkError
-from .parameters import ModelParameters
-from .robot import Robot, RobotSpec, load_robot
+
+if TYPE_CHECKING:
+    from .parameters import ModelParameters
+    from .robot import Robot, RobotSpec, load_robot
 
 __all__ = ["ModelParameters", "PronkError", "Robot", "RobotSpec", "load_robot"]
 __version__ = "0.1.0"
+
+_HOMES = {
+    "ModelParameters": "parameters",
+    "Robot": "robot",
+    "RobotSpec": "robot",
+    "load_robot": "robot",
+}
+"""Where names are that are imported when they are first asked for (PEP 562): a worker process
+watches its parent before it imports NumPy, Pinocchio and MuJoCo, which takes seconds."""
+
+if not TYPE_CHECKING:  # or every name would seem to exist
+
+    def __getattr__(name: str) -> object:
+        if name not in _HOMES:
+            raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+        found = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+        globals()[name] = found
+        return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

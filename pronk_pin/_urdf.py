@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from .errors import FileProblem
+from ._typing import Array
+from .errors import FileProblem, InvalidInput
 from .robot import Robot
 
 _WORLD = "pronk_pin_world"
@@ -34,19 +35,18 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     Raises:
         FileProblem: MuJoCo refuses the URDF.
     """
-    root = ElementTree.parse(robot.urdf_path).getroot()
+    root = ElementTree.fromstring(robot.urdf)
     _drop_shapes(root, collisions=collisions)
-    base = _float_base(root)
     try:
+        base = _float_base(root)
         _merge_impossible_inertias(root)
+    except InvalidInput as error:
+        raise _refused(robot, error) from error
+    try:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
         model = spec.compile()
-    except (ValueError, RuntimeError) as error:  # the latter from Pinocchio's inertias
-        raise FileProblem(
-            robot.urdf_path,
-            f"MuJoCo refuses this URDF ({' '.join(str(error).split())})",
-            "correct the link or joint it names",
-        ) from error
+    except Exception as error:
+        raise _refused(robot, error) from error
     for body in spec.bodies[1:]:  # 0 is the world
         # In one form for every body, so that whoever adds a load finds what is there: links that
         # were fused with others have it already, the rest as the URDF's full matrix.
@@ -56,6 +56,14 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     # The trunk may hang from a root link by a fixed joint; fused, it goes by the root's name.
     spec.body(base).name = robot.spec.base_link
     return spec
+
+
+def _refused(robot: Robot, error: Exception) -> FileProblem:
+    return FileProblem(
+        robot.urdf_path,
+        f"MuJoCo refuses this URDF ({' '.join(str(error).split())})",
+        "correct the link or joint it names",
+    )
 
 
 def _drop_shapes(root: ElementTree.Element, *, collisions: bool) -> None:
@@ -70,9 +78,10 @@ def _drop_shapes(root: ElementTree.Element, *, collisions: bool) -> None:
 def _float_base(root: ElementTree.Element) -> str:
     """Let the root link float, and return its name."""
     children = {joint.child for joint in map(_Joint, root.findall("joint"))}
-    base = next(
-        name for link in root.findall("link") if (name := link.get("name", "")) not in children
-    )
+    names = [link.get("name", "") for link in root.findall("link")]
+    base = next((name for name in names if name not in children), "")
+    if not base:
+        raise InvalidInput("no link is the root of the others")
     # MuJoCo makes the root link the world, so that nothing below a fixed joint could move.
     ElementTree.SubElement(root, "link", name=_WORLD)
     joint = ElementTree.SubElement(root, "joint", name=f"{_WORLD}_to_base", type="floating")
@@ -152,14 +161,14 @@ def link_inertia(link: ElementTree.Element) -> pin.Inertia | None:
     moments = None if inertial is None else inertial.find("inertia")
     if inertial is None or mass is None or moments is None:
         return None
-    xx, xy, xz, yy, yz, zz = (
-        float(moments.get(f"i{axes}", "0")) for axes in ("xx", "xy", "xz", "yy", "yz", "zz")
-    )
-    own = pin.Inertia(
-        float(mass.get("value", "0")),
-        np.zeros(3),
-        np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]),
-    )
+    axes = ("xx", "xy", "xz", "yy", "yz", "zz")
+    xx, xy, xz, yy, yz, zz = (_numbers(moments, f"i{axis}", "0", 1)[0] for axis in axes)
+    matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    weight = float(_numbers(mass, "value", "0", 1)[0])
+    try:
+        own = pin.Inertia(weight, np.zeros(3), matrix)
+    except (ValueError, RuntimeError) as error:
+        raise InvalidInput(f"link {link.get('name')}: {error}") from error
     return _placement(inertial).act(own)
 
 
@@ -185,7 +194,21 @@ def _placement(element: ElementTree.Element) -> pin.SE3:
     origin = element.find("origin")
     if origin is None:
         return pin.SE3.Identity()
-    xyz, rpy = (
-        np.array([float(x) for x in origin.get(key, "0 0 0").split()]) for key in ("xyz", "rpy")
-    )
+    xyz, rpy = (_numbers(origin, key, "0 0 0", 3) for key in ("xyz", "rpy"))
     return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
+
+
+def _numbers(element: ElementTree.Element, key: str, default: str, count: int) -> Array:
+    """The numbers of an attribute, shape (count,).
+
+    Raises:
+        InvalidInput: There are others.
+    """
+    text = element.get(key, default)
+    try:
+        numbers = np.array([float(word) for word in text.split()])
+    except ValueError:
+        numbers = np.empty(0)
+    if len(numbers) != count or not np.all(np.isfinite(numbers)):
+        raise InvalidInput(f'<{element.tag} {key}="{text}">: give {count} finite number(s)')
+    return numbers

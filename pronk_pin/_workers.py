@@ -1,43 +1,51 @@
-"""Initialisation of worker processes."""
+"""What every worker process of ours does first.
+
+It imports the standard library only: a worker is to watch its parent before it imports the rest of
+this package, which takes seconds.
+"""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import shutil
 import signal
+import tempfile
 import threading
 from multiprocessing import connection
+from multiprocessing.sharedctypes import Synchronized
 
-from ._checks import whole
-from .errors import InvalidInput
+_steps_done: Synchronized[int] | None = None
+
 
 _MOST = 1024
 
 
-def follow_parent() -> None:
-    """Leave Ctrl-C to the parent process, and end when it ends."""
+def begin_worker(folder: str, counter: Synchronized[int] | None = None) -> None:
+    """Set a worker up: it leaves Ctrl-C to the parent, ends when that ends, and counts its steps.
+
+    Args:
+        folder: A folder of the parent's for temporary files: workers are ended without notice,
+            and could not clear away what they have in a place of their own.
+        counter: Robot-steps done by all workers; None where nobody asks.
+    """
+    global _steps_done
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tempfile.tempdir = folder
+    _steps_done = counter
     parent = multiprocessing.parent_process()
     assert parent is not None
 
     def follow() -> None:
         connection.wait([parent.sentinel])
+        shutil.rmtree(folder, ignore_errors=True)
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
 
 
-def worker_count(workers: int | None) -> int:
-    """How many processes; None for one for each core.
-
-    Raises:
-        InvalidInput: Not a whole number, or none, or more than any machine has.
-    """
-    if workers is None:
-        return os.cpu_count() or 1
-    workers = whole("workers", workers)
-    if workers < 1:
-        raise InvalidInput(f"{workers} workers; at least one is needed")
-    if workers > _MOST:
-        raise InvalidInput(f"{workers} workers; give {_MOST} or fewer")
-    return workers
+def count_steps(steps: int) -> None:
+    """Tell how many more robot-steps are done, if this process is a worker that counts them."""
+    if _steps_done is not None:
+        with _steps_done.get_lock():
+            _steps_done.value += steps

@@ -5,8 +5,7 @@ Each class carries what is needed to investigate, and its message names the reme
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
 
 _LONGEST_WORD = 60
@@ -49,20 +48,6 @@ class UnknownName(PronkError):
 
 class InvalidInput(PronkError):
     """An argument of the wrong shape, type or range; the message says what is expected."""
-
-
-@contextmanager
-def reading(kind: str, remedy: str) -> Iterator[None]:
-    """Context of reading stored text, which turns defects of the text into `InvalidInput`.
-
-    Args:
-        kind: What the text should be, as in "a scenario".
-        remedy: How to come by it, as in "make the strides again".
-    """
-    try:
-        yield
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInput(f"this is not {kind} ({error}); {remedy}") from error
 
 
 class SpeedOutOfRange(PronkError):

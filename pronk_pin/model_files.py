@@ -11,8 +11,8 @@ import numpy as np
 import pinocchio as pin
 
 from ._urdf import link_inertia, mujoco_spec, set_body_inertia, set_link_inertia
-from .errors import cannot_write
 from .robot import Robot
+from .storage import write_file
 
 _COULOMB_TIME = 0.002
 """Time constant of MuJoCo's joint friction [s]; its default of 0.02 s makes it a damper."""
@@ -72,7 +72,7 @@ def write_urdf(robot: Robot, path: Path | str, notes: Sequence[str] = ()) -> Pat
     Raises:
         FileProblem: The file cannot be written.
     """
-    root = ElementTree.parse(robot.urdf_path).getroot()
+    root = ElementTree.fromstring(robot.urdf)
     bare = robot.bare or robot
     added = _parameters(robot.model.inertias[1]) - _parameters(bare.model.inertias[1])
     frame = robot.model.frames[robot.model.getFrameId(robot.spec.base_link)].placement
@@ -102,13 +102,7 @@ def _parameters(inertia: pin.Inertia) -> np.ndarray:
 
 def _write(path: Path | str, document: str, notes: Sequence[str]) -> Path:
     """Write a document with a comment before it."""
-    path = Path(path)
     # "--" may not stand in a comment.
     comment = "\n".join(line.replace("--", "- -") for line in notes)
     text = f"<!--\n{comment}\n-->\n{document.rstrip()}\n" if notes else f"{document.rstrip()}\n"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    return path
+    return write_file(path, text)

@@ -11,7 +11,6 @@ hip, thigh, calf.
 from __future__ import annotations
 
 import hashlib
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -21,7 +20,8 @@ import pinocchio as pin
 
 from ._checks import instance_of, known_name, numbers
 from ._typing import Array, IntArray
-from .errors import FileProblem, InvalidInput
+from ._urdf_file import read_urdf
+from .errors import InvalidInput
 from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
 from .robot_spec import JOINTS, ROBOTS, RobotSpec, check_names, locate, read_foot_radius
 
@@ -38,6 +38,7 @@ class Robot:
     Attributes:
         spec: The names the robot was built from.
         urdf_path: The URDF it was read from.
+        urdf: What was in it then.
         package_dir: Folder against which the URDF's `package://` meshes are resolved.
         model: Pinocchio's model with a floating base; treat it as read-only.
         foot_radius: Radius of the spherical feet [m].
@@ -48,6 +49,7 @@ class Robot:
 
     spec: RobotSpec
     urdf_path: Path
+    urdf: bytes = field(repr=False)
     package_dir: Path
     model: pin.Model
     foot_radius: float
@@ -205,7 +207,7 @@ class Robot:
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the URDF, and of the parameters if any; results and gaits carry it."""
-        document = self.urdf_path.read_bytes()
+        document = self.urdf
         if self.parameters != NOTHING:
             document += repr(self.parameters).encode()
         return hashlib.sha256(document).hexdigest()
@@ -255,11 +257,7 @@ def load_robot(robot: str | RobotSpec = "a1") -> Robot:
 @lru_cache(maxsize=16)
 def _load(spec: RobotSpec) -> Robot:
     path, package_dir = locate(spec.urdf)
-    try:
-        model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
-        document = ElementTree.parse(path).getroot()
-    except (ValueError, RuntimeError, ElementTree.ParseError) as error:
-        raise FileProblem(path, f"not a usable URDF ({error})", "check the file") from error
+    data, document, model = read_urdf(path)
     model.name = spec.name
     check_names(spec, model, path)
     radius = read_foot_radius(document, spec) if spec.foot_radius is None else spec.foot_radius
@@ -268,6 +266,7 @@ def _load(spec: RobotSpec) -> Robot:
     return Robot(
         spec=spec,
         urdf_path=path,
+        urdf=data,
         package_dir=package_dir,
         model=model,
         foot_radius=radius,

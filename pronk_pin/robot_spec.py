@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ import pinocchio as pin
 
 from ._checks import file_name, none_or, real, reals, sequence_of, text
 from .errors import FileProblem, InvalidInput
+from .storage import check_file
 
 JOINTS = ("hip", "thigh", "calf")
 """Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
@@ -152,7 +154,7 @@ def read_foot_radius(document: ElementTree.Element, spec: RobotSpec) -> float:
     """Radius of the first foot's collision sphere [m].
 
     Raises:
-        InvalidInput: It has none.
+        InvalidInput: It has none, or one without a radius.
     """
     foot = spec.foot_names[0]
     sphere = document.find(f"./link[@name='{foot}']/collision/geometry/sphere")
@@ -160,7 +162,17 @@ def read_foot_radius(document: ElementTree.Element, spec: RobotSpec) -> float:
         raise InvalidInput(
             f"{spec.name}: foot {foot} has no collision sphere; give foot_radius in the RobotSpec"
         )
-    return float(sphere.get("radius", "nan"))
+    text = sphere.get("radius", "")
+    try:
+        radius = float(text)
+    except ValueError:
+        radius = math.nan
+    if not 0.0 < radius < math.inf:
+        raise InvalidInput(
+            f"{spec.name}: the collision sphere of foot {foot} has the radius '{text}'; give a "
+            "length in metres"
+        )
+    return radius
 
 
 def locate(urdf: str) -> tuple[Path, Path]:
@@ -171,8 +183,7 @@ def locate(urdf: str) -> tuple[Path, Path]:
     """
     path = Path(urdf).expanduser()
     if path.is_absolute():
-        if not path.is_file():
-            raise FileProblem(path, "no such URDF", "check the path in the RobotSpec")
+        check_file(path, "check the path in the RobotSpec")
         return path, path.parent
     wanted = f"example-robot-data/robots/{urdf}"
     try:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import functools
 import hashlib
 import io
 import itertools
@@ -20,6 +21,7 @@ import math
 import os
 import re
 import stat
+import tempfile
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -27,10 +29,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
+import msgspec.inspect
 import numpy as np
 import numpy.typing as npt
 
-from .errors import FileProblem, PronkError, cannot_write
+from ._typing import Array
+from .errors import FileProblem, InvalidInput, PronkError, cannot_write
 
 LARGEST_FILE = 2**30
 """Size beyond which no file of ours is read [bytes]; a comparison makes some of 3 % of it."""
@@ -38,7 +42,13 @@ LARGEST_FILE = 2**30
 LARGEST_ARRAYS = 2**28
 """Size beyond which the arrays of an `.npz` are not unpacked [bytes]."""
 
-_PARTIAL = re.compile(r"\..+\.(\d+)-\d+\.partial")
+LARGEST_DOCUMENT = 2**24
+"""Size beyond which no XML is read [bytes]; robots have a hundred kilobytes."""
+
+_DEEPEST = 200
+"""Elements within elements beyond which no XML is read: libraries in C follow them by recursion."""
+
+_PARTIAL = re.compile(r"\..+\.(\d+)-\d+\.partial(\.\w+)?")
 _counter = itertools.count()
 
 _T = TypeVar("_T")
@@ -80,17 +90,72 @@ def write_file(
 
 
 def _replace(target: Path, data: bytes) -> None:
-    partial = target.with_name(f".{target.name}.{os.getpid()}-{next(_counter)}.partial")
+    with _neighbour(target) as partial, partial.open("xb") as stream:
+        stream.write(data)
+        stream.flush()
+
+
+@contextlib.contextmanager
+def _neighbour(target: Path, suffix: str = "") -> Iterator[Path]:
+    """A name beside a file, which takes the file's place at the end, or is gone."""
+    partial = target.with_name(f".{target.name}.{os.getpid()}-{next(_counter)}.partial{suffix}")
     try:
-        with partial.open("xb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())  # a name must not outlive a power cut without its contents
+        yield partial
+        handle = os.open(partial, os.O_RDONLY)
+        try:
+            os.fsync(handle)  # a name must not outlive a power cut without its contents
+        finally:
+            os.close(handle)
         partial.replace(target)
     except BaseException:
         with contextlib.suppress(OSError):
             partial.unlink()
         raise
+
+
+@contextlib.contextmanager
+def partial_path(
+    path: Path | str, *, remedy: str = "choose another place, or make room"
+) -> Iterator[Path]:
+    """A name for libraries that write by name: it becomes the file when the block ends well.
+
+    The name has the file's suffix, by which such libraries know what to write.
+
+    Args:
+        path: The file; folders on the way are made.
+        remedy: What to do where it cannot be written.
+
+    Raises:
+        FileProblem: It cannot be written.
+    """
+    path = Path(path)
+    try:
+        target = Path(os.path.realpath(path))
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise cannot_write(path, error, remedy) from error
+    try:
+        with _neighbour(target, target.suffix) as partial:
+            yield partial
+    except OSError as error:
+        raise cannot_write(path, error, remedy) from error
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder for temporary files, which is gone at the end of the block.
+
+    Raises:
+        FileProblem: It cannot be made.
+    """
+    try:
+        folder = tempfile.TemporaryDirectory(prefix="pronk-pin-", ignore_cleanup_errors=True)
+    except OSError as error:
+        place = tempfile.tempdir or os.environ.get("TMPDIR", "/tmp")
+        remedy = "make room for temporary files, or set TMPDIR"
+        raise cannot_write(place, error, remedy) from error
+    with folder as name:
+        yield Path(name)
 
 
 def clear_partial_files(folder: Path) -> None:
@@ -99,7 +164,8 @@ def clear_partial_files(folder: Path) -> None:
     Raises:
         FileProblem: One cannot be removed.
     """
-    for partial in [*folder.glob("*.partial"), *folder.glob("*/*.partial")]:
+    names = ("*.partial", ".*.partial.*")
+    for partial in [path for name in names for at in ("", "*/") for path in folder.glob(at + name)]:
         writer = _PARTIAL.fullmatch(partial.name)
         if writer is not None and _is_running(int(writer[1])):
             continue
@@ -166,18 +232,39 @@ def read_bytes(path: Path | str, remedy: str, *, limit: int = LARGEST_FILE) -> b
         FileProblem: It is missing, no regular file, too large, or the system cannot read it.
     """
     path = Path(path)
+    check_file(path, remedy, limit=limit)
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error, remedy) from error
+
+
+def check_file(path: Path, remedy: str, *, limit: int = LARGEST_FILE) -> None:
+    """Refuse what is no regular file, before a library waits for it.
+
+    Args:
+        path: The file.
+        remedy: What to do where it is missing or too large.
+        limit: Largest size [bytes].
+
+    Raises:
+        FileProblem: It is missing, no regular file, or too large.
+    """
     try:
         status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise FileProblem(path, "is not a file", remedy)
-        if status.st_size > limit:
-            raise FileProblem(path, f"is too large ({status.st_size / 1e6:.0f} MB)", remedy)
-        return path.read_bytes()
-    except FileNotFoundError as error:
-        raise FileProblem(path, "missing", remedy) from error
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileProblem(path, f"cannot be read ({reason})", remedy) from error
+        raise _unreadable(path, error, remedy) from error
+    if not stat.S_ISREG(status.st_mode):
+        raise FileProblem(path, "is not a file", remedy)
+    if status.st_size > limit:
+        raise FileProblem(path, f"is too large ({status.st_size / 1e6:.0f} MB)", remedy)
+
+
+def _unreadable(path: Path, error: Exception, remedy: str) -> FileProblem:
+    if isinstance(error, FileNotFoundError):
+        return FileProblem(path, "missing", remedy)
+    reason = getattr(error, "strerror", None) or error
+    return FileProblem(path, f"cannot be read ({reason})", remedy)
 
 
 def read_text(path: Path | str, remedy: str, *, limit: int = LARGEST_FILE) -> str:
@@ -208,31 +295,175 @@ def read_xml(path: Path | str, remedy: str, *, what: str = "") -> ElementTree.El
     Raises:
         FileProblem: It cannot be read, or is no XML.
     """
-    data = read_bytes(path, remedy)
+    return parse_xml(read_bytes(path, remedy, limit=LARGEST_DOCUMENT), path, remedy, what=what)
+
+
+def parse_xml(data: bytes, path: Path | str, remedy: str, *, what: str = "") -> ElementTree.Element:
+    """The root of the tree of an XML document that was read from a file.
+
+    Raises:
+        FileProblem: It is no XML, or is nested too deeply, or declares a document type, by which
+            a short document may become a long one.
+    """
     with reading(path, remedy, what=what):
-        return ElementTree.fromstring(data)
+        parser = ElementTree.XMLParser(target=_Builder())
+        parser.feed(data)
+        root: ElementTree.Element = parser.close()
+        return root
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Builds trees that are not too deep."""
+
+    _depth = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> ElementTree.Element:
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise ValueError(f"more than {_DEEPEST} elements within one another")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        raise ValueError("it declares a document type")
+
+
+class StoredArrays(dict[str, npt.NDArray[Any]]):
+    """The arrays of an `.npz` by name, which are asked for with what they have to be.
+
+    Attributes:
+        path: The file.
+        remedy: What to do where they are something else.
+        what: What the file should be.
+    """
+
+    def __init__(
+        self, arrays: Mapping[str, npt.NDArray[Any]], path: Path | str, remedy: str, what: str = ""
+    ) -> None:
+        super().__init__(arrays)
+        self.path, self.remedy, self.what = Path(path), remedy, what
+
+    def damaged(self, reason: Exception | str) -> FileProblem:
+        """The `FileProblem` of contents that are not what they should be."""
+        return damaged(self.path, reason, self.remedy, what=self.what)
+
+    def numbers(self, name: str, *shape: int | None) -> Array:
+        """An array of finite numbers of a given shape, where None stands for any length.
+
+        Raises:
+            FileProblem: It is missing or something else.
+        """
+        found = self._array(name, "fiu", "numbers")
+        fits = len(found.shape) == len(shape) and all(
+            wanted in (None, size) for wanted, size in zip(shape, found.shape, strict=True)
+        )
+        if not fits:
+            listed = ", ".join("n" if size is None else str(size) for size in shape)
+            raise self.damaged(f"{name} has the shape {found.shape}, not ({listed})")
+        if not np.all(np.isfinite(found)):
+            raise self.damaged(f"{name} is not finite")
+        return np.asarray(found, dtype=np.float64)
+
+    def texts(self, name: str) -> list[str]:
+        """An array of texts, shape (n,).
+
+        Raises:
+            FileProblem: It is missing or something else.
+        """
+        found = self._array(name, "U", "text")
+        if found.ndim != 1:
+            raise self.damaged(f"{name} has the shape {found.shape}, not (n)")
+        return [str(text) for text in found]
+
+    def text(self, name: str) -> str:
+        """A text.
+
+        Raises:
+            FileProblem: It is missing or something else.
+        """
+        found = self._array(name, "U", "text")
+        if found.ndim:
+            raise self.damaged(f"{name} has the shape {found.shape}, not ()")
+        return str(found)
+
+    def document(self, name: str) -> Any:
+        """A JSON document that is stored as text.
+
+        Raises:
+            FileProblem: It is missing, or no JSON.
+        """
+        text = self.text(name)
+        with reading(self.path, self.remedy, what=self.what):
+            return json.loads(text)
+
+    def as_type(self, document: object, kind: type[_T]) -> _T:
+        """What such a document says, as a dataclass or another type.
+
+        Raises:
+            FileProblem: It is something else.
+        """
+        return as_type(document, kind, self.path, self.remedy, what=self.what)
+
+    def check(self, schema: int | None) -> None:
+        """Check the schema and the seal that `write_arrays` has added, and take out the seal.
+
+        Raises:
+            FileProblem: Another schema, or something else than when it was written.
+        """
+        if schema is not None:
+            found = self.numbers("schema")
+            if found != schema:
+                raise FileProblem(self.path, f"schema {found:g}, not {schema}", self.remedy)
+        if "sha256" not in self:
+            raise self.damaged("it has no 'sha256'")
+        seal = self.text("sha256")
+        del self["sha256"]
+        if seal != _arrays_sha256(self):
+            raise self.damaged("it was changed after it was written")
+
+    def _array(self, name: str, kinds: str, what: str) -> npt.NDArray[Any]:
+        if name not in self:
+            raise self.damaged(f"it has no '{name}'")
+        if self[name].dtype.kind not in kinds:
+            raise self.damaged(f"{name} is {self[name].dtype.name}, not {what}")
+        return self[name]
 
 
 def read_arrays(
-    path: Path | str, remedy: str, *, what: str = "", limit: int = LARGEST_ARRAYS
-) -> dict[str, npt.NDArray[Any]]:
-    """Read the arrays of an `.npz`, after a look at how large they say they are.
+    path: Path | str,
+    remedy: str,
+    *,
+    what: str = "",
+    schema: int | None = None,
+    limit: int = LARGEST_ARRAYS,
+) -> StoredArrays:
+    """Read an `.npz` that `write_arrays` made, after a look at how large it says it is.
 
     Args:
         path: The file.
         remedy: What to do where it cannot be read.
         what: What the file should be.
+        schema: The version of its format that it was written with; None for none.
         limit: Largest size of all arrays together [bytes].
 
     Raises:
-        FileProblem: It is missing, damaged or too large, or holds objects, which are never read.
+        FileProblem: It is missing, damaged, changed, of another schema or too large, or holds
+            objects, which are never read.
     """
     data = read_bytes(path, remedy)
     with reading(path, remedy, what=what), zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = archive.infolist()
         if sum(member.file_size for member in members) > limit:
             raise ValueError(f"more than {limit / 1e6:.0f} MB when unpacked")
-        return {member.filename.removesuffix(".npy"): _array(archive, member) for member in members}
+        arrays = {
+            member.filename.removesuffix(".npy"): _array(archive, member) for member in members
+        }
+    stored = StoredArrays(arrays, path, remedy, what)
+    stored.check(schema)
+    return stored
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> npt.NDArray[Any]:
@@ -253,16 +484,36 @@ def write_arrays(
     path: Path | str,
     arrays: Mapping[str, npt.ArrayLike],
     *,
+    schema: int | None = None,
     remedy: str = "choose another place, or make room",
 ) -> Path:
-    """Write an `.npz`, whole or not at all.
+    """Write an `.npz`, whole or not at all, with the SHA-256 of its arrays as `sha256` in it.
+
+    Args:
+        path: The file.
+        arrays: The arrays, by name.
+        schema: The version of its format; None for none.
+        remedy: What to do where it cannot be written.
 
     Raises:
         FileProblem: It cannot be written.
     """
+    stored = {name: np.asarray(array) for name, array in arrays.items()}
+    if schema is not None:
+        stored = {"schema": np.array(schema), **stored}
+    stored["sha256"] = np.array(_arrays_sha256(stored))
     stream = io.BytesIO()
-    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    np.savez_compressed(stream, **stored)  # type: ignore[arg-type]
     return write_file(path, stream.getvalue(), remedy=remedy)
+
+
+def _arrays_sha256(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
+    """SHA-256 of arrays with their names, types and shapes."""
+    digest = hashlib.sha256()
+    for name, array in sorted(arrays.items()):
+        digest.update(json.dumps([name, array.dtype.str, array.shape]).encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def read_csv(path: Path | str, remedy: str) -> list[list[str]]:
@@ -279,7 +530,9 @@ def read_csv(path: Path | str, remedy: str) -> list[list[str]]:
     return rows
 
 
-def as_type(document: object, kind: type[_T], path: Path | str, remedy: str) -> _T:
+def as_type(
+    document: object, kind: type[_T], path: Path | str, remedy: str, *, what: str = ""
+) -> _T:
     """What a JSON document says, as a dataclass or another type.
 
     Args:
@@ -287,6 +540,7 @@ def as_type(document: object, kind: type[_T], path: Path | str, remedy: str) -> 
         kind: The type; unknown fields of a dataclass are refused.
         path: Where the document comes from, for the error.
         remedy: What to do where it is something else.
+        what: What the file should be.
 
     Raises:
         FileProblem: It is something else.
@@ -296,16 +550,69 @@ def as_type(document: object, kind: type[_T], path: Path | str, remedy: str) -> 
         unknown_fields(document, kind)
         return msgspec.convert(document, kind)
     except (msgspec.ValidationError, RecursionError) as error:
-        raise damaged(path, error, remedy) from error
+        raise damaged(path, error, remedy, what=what) from error
 
 
-def unknown_fields(document: object, kind: type[Any]) -> None:
-    """Refuse fields that a dataclass does not have, at its first level."""
-    fields = getattr(kind, "__dataclass_fields__", None)
-    if fields is not None and isinstance(document, dict):
-        strangers = [str(name) for name in document if name not in fields]
-        if strangers:
-            raise msgspec.ValidationError(f"unknown field {', '.join(strangers)}")
+def from_text(text: str, kind: type[_T], what: str, remedy: str) -> _T:
+    """What JSON says that one of our own dataclasses was written to with everything in it.
+
+    Args:
+        text: The text.
+        kind: The dataclass; a field too few is refused as one too many.
+        what: What the text should be, as in "a scenario".
+        remedy: How to come by it, as in "make the strides again".
+
+    Raises:
+        InvalidInput: The text is something else.
+        PronkError: What the dataclass itself raises for values that are out of range.
+    """
+    try:
+        document = json.loads(text)
+        unknown_fields(document, kind, complete=True)
+        return msgspec.convert(document, kind)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(f"this is not {what} ({error}); {remedy}") from error
+
+
+def unknown_fields(document: object, kind: Any, *, complete: bool = False) -> None:
+    """Refuse fields that a dataclass, or one within it, does not have.
+
+    Args:
+        document: Lists, dictionaries, strings, numbers.
+        kind: The dataclass, or another type.
+        complete: Refuse missing fields too, even those that have a default.
+    """
+    _compare_fields(document, _type_info(kind), complete)
+
+
+@functools.lru_cache(maxsize=64)
+def _type_info(kind: Any) -> msgspec.inspect.Type:
+    return msgspec.inspect.type_info(kind)
+
+
+def _compare_fields(document: object, info: msgspec.inspect.Type, complete: bool) -> None:
+    inspect = msgspec.inspect
+    if isinstance(info, inspect.UnionType):
+        structured = [part for part in info.types if not isinstance(part, inspect.NoneType)]
+        if len(structured) == 1:
+            _compare_fields(document, structured[0], complete)
+    elif isinstance(info, inspect.DataclassType) and isinstance(document, dict):
+        fields = {field.name: field.type for field in info.fields}
+        for strangers, word in [
+            (document.keys() - fields.keys(), "unknown"),
+            (fields.keys() - document.keys() if complete else set(), "missing"),
+        ]:
+            if strangers:
+                listed = ", ".join(sorted(map(str, strangers)))
+                raise msgspec.ValidationError(f"{word} field {listed}")
+        for name, part in document.items():
+            _compare_fields(part, fields[name], complete)
+    elif isinstance(info, inspect.ListType | inspect.VarTupleType) and isinstance(document, list):
+        for part in document:
+            _compare_fields(part, info.item_type, complete)
+    elif isinstance(info, inspect.DictType) and isinstance(document, dict):
+        for part in document.values():
+            _compare_fields(part, info.value_type, complete)
 
 
 def sha256(data: bytes | str) -> str:

@@ -425,7 +425,7 @@ def test_the_full_table_has_every_row(robot: Robot, spec: mujoco.MjSpec) -> None
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<mujoco><worldbody>", "not XML"),
+        ("<mujoco><worldbody>", r"damaged \(no element found"),
         ("<html/>", "neither a URDF nor an MJCF"),
         ("<robot name='half'/>", "not a usable URDF"),
         ("<mujoco><worldbody><body><geom/></body></worldbody></mujoco>", "MuJoCo cannot load it"),

@@ -78,7 +78,7 @@ def test_a_urdf_of_ones_own_is_read_from_its_path(robot: Robot) -> None:
 def test_a_damaged_urdf_is_named(tmp_path: Path) -> None:
     path = tmp_path / "broken.urdf"
     path.write_text("<robot name='half'><link")
-    with pytest.raises(FileProblem, match=r"broken\.urdf: not a usable URDF"):
+    with pytest.raises(FileProblem, match=r"broken\.urdf: damaged URDF"):
         load_robot(RobotSpec("broken", str(path)))
 
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import io
+import signal
 import sys
 import textwrap
+import threading
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import FrameType
 from typing import Annotated, Any, Protocol, TextIO, Union
 
 import tyro
@@ -66,21 +71,56 @@ Command = (
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; the exit code is 0, 1 for an error of ours or models that differ, 2 for wrong
-    usage, 130 on Ctrl-C."""
-    arguments = todays_options(sys.argv[1:] if arguments is None else arguments)
+    usage, 130 on Ctrl-C, and 143 or 129 where the program is asked to end by SIGTERM or SIGHUP."""
+    with _orderly_end() as asked:
+        try:
+            return _run(arguments)
+        except PronkError as error:
+            if not asked:
+                print(f"pronk-pin: {' '.join(str(error).splitlines())}", file=sys.stderr)
+                return 1
+        except KeyboardInterrupt:
+            if not asked:
+                print("pronk-pin: interrupted", file=sys.stderr)
+                return 130
+        except SystemExit:
+            if not asked:
+                raise
+    # Some libraries make errors of their own of what comes amid them.
+    print(f"pronk-pin: ended by {signal.Signals(asked[0]).name}", file=sys.stderr)
+    return 128 + asked[0]
+
+
+def _run(arguments: list[str] | None) -> int:
+    command = _parsed(todays_options(sys.argv[1:] if arguments is None else arguments))
+    with warnings.catch_warnings():
+        for category in (LeakyFilter, OtherMachine):
+            warnings.simplefilter("once", category)
+        warnings.showwarning = _show_warning
+        return command.run() or 0
+
+
+@contextmanager
+def _orderly_end() -> Iterator[list[int]]:
+    """Have the signals that ask a program to end do what Ctrl-C does, so that nothing stays behind:
+    temporary folders, processes, half a file. Yields a list that holds the signal once it came."""
+    asked: list[int] = []
+
+    def end(number: int, frame: FrameType | None) -> None:
+        if not asked:  # `timeout` sends two; the second must not disturb the clearing up
+            asked.append(number)
+            raise SystemExit(128 + number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) == signal.SIG_DFL:  # `nohup` wants it ignored
+                before[number] = signal.signal(number, end)
     try:
-        command = _parsed(arguments)
-        with warnings.catch_warnings():
-            for category in (LeakyFilter, OtherMachine):
-                warnings.simplefilter("once", category)
-            warnings.showwarning = _show_warning
-            return command.run() or 0
-    except PronkError as error:
-        print(f"pronk-pin: {' '.join(str(error).splitlines())}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("pronk-pin: interrupted", file=sys.stderr)
-        return 130
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _parsed(arguments: list[str]) -> _Runs:

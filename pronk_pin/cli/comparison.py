@@ -10,8 +10,7 @@ from typing import Annotated
 import numpy as np
 from tyro.conf import Positional, arg
 
-from .._checks import none_or, real, seed, whole
-from .._workers import worker_count
+from .._checks import none_or, real, seed, whole, worker_count
 from ..compare import (
     Experiment,
     Results,

@@ -11,16 +11,15 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing.sharedctypes import Synchronized
 
 from .._checks import shown
-from .._workers import follow_parent
+from .._workers import begin_worker
+from .._workers import count_steps as count_steps  # for those who are handed a crew
 from ..errors import ExecutorUnavailable, InvalidInput
+from ..storage import temporary_folder
 
 _PATIENCE = 10.0
 """Timeout of a scheduler's answer [s]."""
-
-_steps_done: Synchronized[int] | None = None
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,11 @@ class Crew:
 
 @contextmanager
 def processes(count: int) -> Iterator[Crew]:
-    """Start a pool of processes on this machine."""
+    """Start a pool of processes on this machine.
+
+    Raises:
+        FileProblem: There is no room for temporary files.
+    """
     context = multiprocessing.get_context("spawn")
     counter = context.Value("q", 0)
     before = set(multiprocessing.active_children())
@@ -53,25 +56,14 @@ def processes(count: int) -> Iterator[Crew]:
         for process in set(multiprocessing.active_children()) - before:
             process.terminate()  # what they have not finished is simulated again next time
 
-    with ProcessPoolExecutor(
-        count, context, initializer=_begin_worker, initargs=(counter,)
-    ) as pool:
+    with (
+        temporary_folder() as folder,
+        ProcessPoolExecutor(
+            count, context, initializer=begin_worker, initargs=(str(folder), counter)
+        ) as pool,
+    ):
         name = f"{count} process{'es' if count > 1 else ''}"
         yield Crew(pool, name, steps=lambda: counter.value, stop=stop)
-
-
-def count_steps(steps: int) -> None:
-    """Report finished robot-steps, if this process is one of `processes`."""
-    if _steps_done is not None:
-        with _steps_done.get_lock():
-            _steps_done.value += steps
-
-
-def _begin_worker(counter: Synchronized[int]) -> None:
-    """Initialise a worker: it counts its steps, leaves Ctrl-C to the parent, and dies with it."""
-    global _steps_done
-    _steps_done = counter
-    follow_parent()
 
 
 def known_address(address: str) -> str:

@@ -9,19 +9,21 @@ too, are the scenario's, whose ground it is.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from .._checks import path as known_path
+from .._mjcf import loading, read_mjcf
 from .._state import as_robot
-from ..errors import FileProblem, InvalidInput, reading
+from ..errors import InvalidInput
 from ..parity import SIX_DIGITS, Parity, compare_models
 from ..robot import Robot
+from ..storage import from_text, read_bytes, sha256
 
 _FREE, _HINGE = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_HINGE
 
@@ -44,10 +46,7 @@ def mjcf_spec(robot: Robot, path: Path | str, *, actuators: bool = False) -> muj
     """
     as_robot(robot)
     path = known_path("path", path).expanduser()
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-    except (ValueError, RuntimeError) as error:
-        raise _unreadable(path, error) from error
+    spec = read_mjcf(path)
     trunk = _trunk(spec, robot, path)
     _keep_the_robot(spec, trunk)
     for actuator in [] if actuators else spec.actuators:
@@ -58,12 +57,12 @@ def mjcf_spec(robot: Robot, path: Path | str, *, actuators: bool = False) -> muj
     trunk.pos, trunk.quat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
     for joint in trunk.joints:  # which may have inherited friction that was meant for the legs
         joint.armature, joint.frictionloss, joint.damping = 0.0, 0.0, np.zeros(len(joint.damping))
-    try:
-        _write_inertias(spec, spec.compile())
-        _drop_shapes(spec)
+    with loading(path):
+        compiled = spec.compile()
+    _write_inertias(spec, compiled)
+    _drop_shapes(spec)
+    with loading(path):
         spec.compile()
-    except (ValueError, RuntimeError) as error:
-        raise _unreadable(path, error) from error
     return spec
 
 
@@ -107,10 +106,15 @@ class ForeignRobot:
         Raises:
             InvalidInput: The text is something else.
         """
-        with reading("a record of an MJCF", "make it again"):
-            values = json.loads(text)
-            parity = Parity.from_json(json.dumps(values["parity"]))
-            return cls(str(values["path"]), str(values["sha256"]), parity)
+        stored = from_text(text, _Stored, "a record of an MJCF", "make it again")
+        return cls(stored.path, stored.sha256, Parity.from_json(json.dumps(stored.parity)))
+
+
+@dataclass(frozen=True)
+class _Stored:
+    path: str
+    sha256: str
+    parity: dict[str, Any]
 
 
 def mjcf_sha256(path: Path | str) -> str:
@@ -120,12 +124,11 @@ def mjcf_sha256(path: Path | str) -> str:
         FileProblem: It cannot be read.
     """
     path = known_path("path", path).expanduser()
-    try:
+    read_mjcf(path)
+    with loading(path):
         others = sorted({Path(name) for name in mujoco.mju_getXMLDependencies(str(path))} - {path})
-        files = [path, *(other for other in others if other.is_file())]
-        return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
-    except (OSError, RuntimeError, mujoco.FatalError) as error:
-        raise _unreadable(path, error) from error
+    files = [path, *(other for other in others if other.is_file())]
+    return sha256(b"".join(read_bytes(file, "put the file in order") for file in files))
 
 
 def _trunk(spec: mujoco.MjSpec, robot: Robot, path: Path) -> mujoco.MjsBody:
@@ -198,12 +201,3 @@ def _write_inertias(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
 def _links(spec: mujoco.MjSpec) -> list[mujoco.MjsBody]:
     """All bodies but the world."""
     return list(spec.bodies[1:])
-
-
-def _unreadable(path: Path, error: Exception) -> FileProblem:
-    reason = " ".join(str(error).split())
-    return FileProblem(
-        path,
-        f"MuJoCo cannot load it ({reason})",
-        "give the path of an MJCF, with the files it names beside it where its meshdir says",
-    )

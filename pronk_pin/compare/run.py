@@ -20,8 +20,7 @@ import xarray as xr
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from .._checks import instance_of, path
-from .._workers import worker_count
+from .._checks import instance_of, path, worker_count
 from ..control import load_controller
 from ..errors import FileProblem, WorkerLost
 from .demand import check_demand

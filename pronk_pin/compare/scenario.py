@@ -29,7 +29,8 @@ from .._checks import (
     whole,
 )
 from .._checks import seed as known_seed
-from ..errors import InvalidInput, UnknownName, reading
+from ..errors import InvalidInput, UnknownName
+from ..storage import from_text
 from .mismatch import KNOWN, ROTOR
 from .sensors import Sensors
 
@@ -151,10 +152,7 @@ class Scenario:
         Raises:
             InvalidInput: The text is something else.
         """
-        with reading("a scenario", "make the strides again"):
-            values = json.loads(text)
-            vectors = {name: tuple(values[name]) for name in _VECTORS}
-            return cls(**{**values, **vectors, "sensors": Sensors(**values["sensors"])})
+        return from_text(text, cls, "a scenario", "make the strides again")
 
     def _check_ground(self) -> None:
         if not self.ground_time_constant >= 2 * self.timestep:

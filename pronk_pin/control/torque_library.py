@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -12,11 +11,12 @@ import numpy as np
 from .._checks import numbers
 from .._checks import path as known_path
 from .._typing import Array, BoolArray
-from ..errors import FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
+from ..errors import InvalidInput, SpeedOutOfRange
 from ..robot import NL
+from ..storage import read_arrays, write_arrays
 from .record import resample
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the file format."""
 LANDS_ALIKE = 5e-4
 """Difference of two flights [s] below which they were learned for the same touchdown: contact is
@@ -62,9 +62,10 @@ class TorqueLibrary:
                 f"and {self.flight.shape}; give (n,), (n, 2, samples, {NL}) and (n,)"
             )
         lengths = {len(part) for part in (self.torque, self.speeds, self.flight)}
-        if self.torque.shape != self.spread.shape or len(lengths) > 1:
+        if self.torque.shape != self.spread.shape or len(lengths) > 1 or not len(self.speeds):
             raise InvalidInput(
-                "a torque library needs one torque, one spread and one flight for each speed"
+                "a torque library needs one torque, one spread and one flight for each speed, "
+                "and a speed at least"
             )
         if np.any(np.diff(self.speeds) <= 0.0):
             raise InvalidInput("the speeds of a torque library must increase")
@@ -161,21 +162,8 @@ class TorqueLibrary:
         Raises:
             FileProblem: It cannot be written.
         """
-        path = Path(path)
-        partial = path.with_name(path.name + ".partial")
-        try:
-            with partial.open("wb") as file:
-                np.savez_compressed(
-                    file,
-                    schema=np.array(SCHEMA),
-                    speeds=self.speeds,
-                    torque=self.torque,
-                    spread=self.spread,
-                    flight=self.flight,
-                )
-            partial.replace(path)
-        except OSError as error:
-            raise cannot_write(path, error) from error
+        arrays = {name: getattr(self, name) for name in ("speeds", "torque", "spread", "flight")}
+        write_arrays(path, arrays, schema=SCHEMA)
 
     @classmethod
     def load(cls, path: Path | str) -> TorqueLibrary:
@@ -185,16 +173,12 @@ class TorqueLibrary:
             FileProblem: The file is missing or damaged.
         """
         path = known_path("path", path)
-        if not path.is_file():
-            raise FileProblem(path, "missing", _AGAIN)
+        arrays = read_arrays(path, _AGAIN, what="torque library", schema=SCHEMA)
+        speeds = arrays.numbers("speeds", None)
+        torque = arrays.numbers("torque", len(speeds), 2, None, None)
+        spread = arrays.numbers("spread", *torque.shape)
+        flight = arrays.numbers("flight", len(speeds))
         try:
-            with np.load(path, allow_pickle=False) as file:
-                if int(file["schema"]) != SCHEMA:
-                    raise FileProblem(path, f"schema {int(file['schema'])}, not {SCHEMA}", _AGAIN)
-                names = ("speeds", "torque", "spread", "flight")
-                parts = [np.asarray(file[name], float) for name in names]
-            if not all(np.isfinite(part).all() for part in parts):
-                raise ValueError("numbers that are not finite")
-            return cls(*parts)
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, InvalidInput) as error:
-            raise FileProblem(path, f"damaged ({error})", _AGAIN) from error
+            return cls(speeds, torque, spread, flight)
+        except InvalidInput as error:
+            raise arrays.damaged(error) from error

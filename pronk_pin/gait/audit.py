@@ -58,7 +58,7 @@ def audit(solution: GaitSolution, *, refine: bool = True) -> Audit:
         *_bezier(solution),
         *_use(solution),
     )
-    return Audit(solution.problem.speed, constraints, checks)
+    return Audit(solution.problem.speed, solution.gait.sha256, constraints, checks)
 
 
 class BezierLoss(NamedTuple):

@@ -11,12 +11,11 @@ import dataclasses
 import importlib.metadata
 import multiprocessing
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,16 +24,17 @@ import numpy as np
 from tqdm import tqdm
 
 from .._checks import path as known_path
-from .._checks import reals
+from .._checks import reals, worker_count
 from .._state import as_robot
 from .._typing import Array
-from .._workers import follow_parent, worker_count
+from .._workers import begin_worker
 from ..base import Base
 from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
 from ..robot import Robot, RobotSpec, load_robot
+from ..storage import clear_partial_files, read_arrays, temporary_folder, write_arrays
 from .audit import audit, bezier_orders
 from .ballistics import check_ballistics
-from .library import DAMAGE, SCHEMA, GaitLibrary, from_arrays, to_arrays, write_arrays
+from .library import PER_GAIT, SCHEMA, GaitLibrary, from_arrays, to_arrays
 from .optimize import GaitSolution, SolverState, optimize_gait
 from .problem import GaitProblem
 from .style import gait_problem, load_style
@@ -133,10 +133,17 @@ class _Task:
 @contextmanager
 def _folder(folder: Path | str | None) -> Iterator[Path]:
     if folder is not None:
-        yield known_path("folder", folder)
+        folder = known_path("folder", folder)
+        clear_partial_files(folder)
+        try:
+            yield folder
+        except BaseException:
+            with suppress(FileProblem):  # workers that were ended leave half of a file
+                clear_partial_files(folder)
+            raise
         return
-    with tempfile.TemporaryDirectory(prefix="pronk-pin-gaits-") as temporary:
-        yield Path(temporary)
+    with temporary_folder() as temporary:
+        yield temporary
 
 
 def _home(apexes: Sequence[float] | Array, desired: float) -> float:
@@ -237,7 +244,12 @@ def _in_processes(
     """Gaits in a pool of processes; each waits for the neighbour that it starts from."""
     context = multiprocessing.get_context("spawn")
     running: dict[Future[None], Key] = {}
-    with ProcessPoolExecutor(workers, context, initializer=follow_parent) as pool:
+    with (
+        temporary_folder() as folder,
+        ProcessPoolExecutor(
+            workers, context, initializer=begin_worker, initargs=(str(folder),)
+        ) as pool,
+    ):
         try:
             while waiting or running:
                 for key in [k for k in waiting if parents[k] is None or parents[k] in done]:
@@ -293,7 +305,7 @@ def _work(task: _Task, start: Path | None) -> None:
     arrays = to_arrays(GaitLibrary((solution.gait,), metadata, (audit_result,)))
     arrays |= {"x": state.x, "lam_x": state.lam_x, "lam_g": state.lam_g}
     arrays["fingerprint"] = np.array(task.problem.fingerprint())
-    write_arrays(task.path, arrays)
+    write_arrays(task.path, arrays, schema=SCHEMA, remedy="choose another folder")
 
 
 def _solve(problem: GaitProblem, neighbour: _Solved | None) -> GaitSolution:
@@ -312,26 +324,23 @@ def _read(task: _Task) -> _Solved:
     Raises:
         FileProblem: It is damaged, or holds a gait of another problem.
     """
-    path = task.path
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        if int(arrays["schema"]) != SCHEMA:
-            raise FileProblem(path, f"schema {arrays['schema']}, not {SCHEMA}", _AGAIN)
-        fingerprint = str(arrays["fingerprint"])
-        state = SolverState(*(np.array(arrays[key]) for key in ("x", "lam_x", "lam_g")))
-        if not all(np.all(np.isfinite(part)) for part in (state.x, state.lam_x, state.lam_g)):
-            raise ValueError("the solver's state is not finite")
-        solved = _Solved(from_arrays(arrays), state)
-    except (*DAMAGE, InvalidInput) as error:
-        raise FileProblem(path, f"damaged gait ({error})", _AGAIN) from error
-    if fingerprint != task.problem.fingerprint():
+    arrays = read_arrays(task.path, _AGAIN, what="gait", schema=SCHEMA)
+    if arrays.text("fingerprint") != task.problem.fingerprint():
         raise FileProblem(
-            path,
+            task.path,
             "a gait of another problem (robot, base, sequence, bounds or weights)",
             "choose another folder, or delete this one",
         )
-    return solved
+    library = from_arrays(arrays)
+    state = SolverState(*(arrays.numbers(name, None) for name in ("x", "lam_x", "lam_g")))
+    kept = library.metadata
+    if (
+        len(library.gaits) != 1
+        or len(library.audit) != 1
+        or not {*PER_GAIT, "bezier_orders"} <= {*kept}
+    ):
+        raise arrays.damaged("it is not of one gait, with its audit")
+    return _Solved(library, state)
 
 
 def _library(

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from ..errors import InvalidInput
+
 TOLERANCE = 1e-8
 """Largest violation of a constraint that passes, in the constraint's unit."""
 
@@ -120,16 +122,31 @@ class Check:
 
 
 @dataclass(frozen=True)
+class StoredAudit:
+    """An audit as a file keeps it.
+
+    Attributes:
+        motion: `Gait.sha256` of the gait.
+        checks: For each check, by name, its worst value and where it was found.
+    """
+
+    motion: str
+    checks: Mapping[str, tuple[float, str]]
+
+
+@dataclass(frozen=True)
 class Audit:
     """Result of the audit of one gait.
 
     Attributes:
         speed: Speed of the gait [m/s].
+        motion: `Gait.sha256` of the gait.
         constraints: The named constraints of the problem with their worst violations.
         checks: The independent checks.
     """
 
     speed: float
+    motion: str
     constraints: tuple[Check, ...]
     checks: tuple[Check, ...]
 
@@ -153,29 +170,35 @@ class Audit:
         return next(check for check in self.checks if check.name == name)
 
     def as_json(self) -> dict[str, Any]:
-        """Values and places by name, as a file keeps them; constraints as "violation: name"."""
+        """What a file keeps: the motion's SHA-256, and for each check its value and place by name;
+        constraints as "violation: name"."""
         named = [(_VIOLATION + check.name, check) for check in self.constraints]
         named += [(check.name, check) for check in self.checks]
-        return {name: [check.value, check.where] for name, check in named}
+        return {
+            "motion": self.motion,
+            "checks": {name: [check.value, check.where] for name, check in named},
+        }
 
     @classmethod
-    def from_json(cls, speed: float, entries: Mapping[str, Any]) -> Audit:
+    def from_stored(cls, speed: float, stored: StoredAudit) -> Audit:
         """The audit that a file keeps; what passes is decided anew.
 
         Raises:
-            KeyError: A check that this version does not know, or one that is missing.
+            InvalidInput: A check that this version does not know, or one that is missing.
         """
         constraints, checks = [], []
-        for name, (value, where) in entries.items():
-            if name.startswith(_VIOLATION):
-                name = name.removeprefix(_VIOLATION)
-                constraints.append(Check.of_constraint(name, float(value), str(where)))
+        for full_name, (value, where) in stored.checks.items():
+            name = full_name.removeprefix(_VIOLATION)
+            if name not in (UNITS if name != full_name else CHECKS):
+                raise InvalidInput(f"audit with a check '{full_name}' that is not known")
+            if name != full_name:
+                constraints.append(Check.of_constraint(name, value, where))
             else:
-                checks.append(Check.of(name, float(value), str(where)))
+                checks.append(Check.of(name, value, where))
         missing = set(CHECKS) - {check.name for check in checks}
         if missing or not constraints:
-            raise KeyError(f"audit without {', '.join(sorted(missing)) or 'constraints'}")
-        return cls(speed, tuple(constraints), tuple(checks))
+            raise InvalidInput(f"audit without {', '.join(sorted(missing)) or 'constraints'}")
+        return cls(speed, stored.motion, tuple(constraints), tuple(checks))
 
     def table(self) -> str:
         """The audit as text, one line a check."""

@@ -7,6 +7,7 @@ on all four feet, then `flight` on none; the touchdown impact closes the cycle.
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -88,7 +89,7 @@ def _phases(s: Array) -> Array:
 
 @dataclass(frozen=True)
 class GaitPhase:
-    """One phase of a gait.
+    """One phase of a gait; its arrays are read-only.
 
     Attributes:
         name: Its name in the contact sequence: "stance" or "flight" in pronking.
@@ -108,6 +109,13 @@ class GaitPhase:
     base: Array
     tau: Array
     lam: Array
+
+    def __post_init__(self) -> None:
+        # An audit is of these numbers; who wants others makes a phase of them.
+        for name in ARRAYS:
+            coefficients = np.asarray(getattr(self, name), dtype=np.float64).view()
+            coefficients.flags.writeable = False
+            object.__setattr__(self, name, coefficients)
 
     def joint_reference(self, s: Array) -> tuple[Array, Array]:
         """Joint angles [rad] and velocities [rad/s] at the phases s, each of shape (n, 12)."""
@@ -161,6 +169,20 @@ class Gait:
     apex: float
     phases: tuple[GaitPhase, ...]
 
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the motion: its robot's name and all of its numbers, to the last bit."""
+        phases = [
+            [phase.name, phase.feet, float(phase.duration).hex(), phase.joints.shape]
+            for phase in self.phases
+        ]
+        head = [self.robot, float(self.speed).hex(), float(self.apex).hex(), phases]
+        digest = hashlib.sha256(json.dumps(head).encode())
+        for phase in self.phases:
+            for name in ARRAYS:
+                digest.update(getattr(phase, name).astype("<f8").tobytes())
+        return digest.hexdigest()
+
     def phase(self, name: str) -> GaitPhase:
         """The phase of that name."""
         text("name of a phase", name)
@@ -179,17 +201,6 @@ class Gait:
     def flight(self) -> GaitPhase:
         """The flight phase."""
         return self.phase("flight")
-
-    @cached_property
-    def sha256(self) -> str:
-        """SHA-256 of the motion: names, feet, durations and coefficients."""
-        digest = hashlib.sha256(repr((self.robot, float(self.speed), float(self.apex))).encode())
-        for phase in self.phases:
-            digest.update(repr((phase.name, tuple(phase.feet), float(phase.duration))).encode())
-            for name in ARRAYS:
-                array = np.ascontiguousarray(getattr(phase, name), dtype="<f8")
-                digest.update(repr((name, array.shape)).encode() + array.tobytes())
-        return digest.hexdigest()
 
     @property
     def duration(self) -> float:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -17,14 +16,16 @@ from .._checks import instance_of, none_or, real, sequence_of
 from .._checks import path as known_path
 from .._typing import Array
 from ..base import Base
-from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange, cannot_write
-from ..robot import ROBOTS, Robot, load_robot
-from .checks import Audit
+from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange
+from ..kinematics.contacts import Contact
+from ..robot import NL, ROBOTS, Robot, load_robot
+from ..storage import StoredArrays, read_arrays, sha256, write_arrays
+from .checks import Audit, StoredAudit
 from .gait import ARRAYS, Gait, GaitPhase
 from .residual import GaitResidual, gait_residual
 from .style import library_name
 
-SCHEMA = 2
+SCHEMA = 3
 """Version of the file format."""
 
 _REBUILD = "make it again with 'pronk-pin gaits build'"
@@ -69,6 +70,12 @@ class GaitLibrary:
             raise InvalidInput(
                 f"{len(self.audit)} audits for {len(self.gaits)} gaits; give each one"
             )
+        for gait, found in zip(self.gaits, self.audit, strict=bool(self.audit)):
+            if gait.sha256 != found.motion:
+                raise InvalidInput(
+                    f"the gait at {gait.speed:g} m/s is not the one that was audited; "
+                    "audit it anew, or leave the audits out"
+                )
         if np.isnan(self.apex):
             object.__setattr__(self, "apex", float(self.apexes[0]))
         _index(self.apexes, self.apex, "apex")
@@ -87,6 +94,13 @@ class GaitLibrary:
     def apexes(self) -> Array:
         """Apex heights of the grid [m], increasing, shape (m,)."""
         return _distinct(gait.apex for gait in self.gaits)
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of everything that moves: the gaits, how the trunk may move, and which apex is
+        meant where none is asked for."""
+        digests = [gait.sha256 for gait in self.gaits]
+        return sha256(json.dumps([*digests, self.base, float(self.apex).hex()]))
 
     @property
     def base(self) -> Base:
@@ -174,8 +188,7 @@ class GaitLibrary:
             FileProblem: The file cannot be written.
         """
         path = known_path("path", path)
-        write_arrays(path, to_arrays(self))
-        return path
+        return write_arrays(path, to_arrays(self), schema=SCHEMA, remedy="choose another")
 
     @classmethod
     def load(
@@ -195,49 +208,20 @@ class GaitLibrary:
         path = known_path("path", path)
         if robot is not None:
             instance_of("robot", robot, Robot, "a Robot, as load_robot() returns it")
-        if not path.is_file():
-            raise FileProblem(path, "no such gait library", _REBUILD)
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            if int(arrays["schema"]) != SCHEMA:
-                raise FileProblem(path, f"schema {arrays['schema']}, not {SCHEMA}", _REBUILD)
-            library = from_arrays(arrays)
-        except (*DAMAGE, InvalidInput) as error:
-            raise FileProblem(path, f"damaged gait library ({error})", _REBUILD) from error
+        library = from_arrays(read_arrays(path, _REBUILD, what="gait library", schema=SCHEMA))
         _check_model(path, library, robot)
         if audited:
             _check_audit(path, library)
         return library
 
 
-DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile)
-"""Errors that reading a damaged `.npz` raises."""
-
 PER_GAIT = ("cost", "iterations", "solve_time", "work_time")
 """Metadata with one value for each gait."""
-
-
-def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write an `.npz` atomically.
-
-    Raises:
-        FileProblem: The file cannot be written.
-    """
-    partial = path.with_name(path.name + ".partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with partial.open("wb") as file:
-            np.savez_compressed(file, **arrays)
-        partial.replace(path)
-    except OSError as error:
-        raise cannot_write(path, error, "choose another") from error
 
 
 def to_arrays(library: GaitLibrary) -> dict[str, Any]:
     """Arrays of a library, as an `.npz` holds them."""
     arrays: dict[str, Any] = {
-        "schema": np.array(SCHEMA),
         "speed": np.array([gait.speed for gait in library.gaits]),
         "apex": np.array([gait.apex for gait in library.gaits]),
         "default_apex": np.array(library.apex),
@@ -254,30 +238,92 @@ def to_arrays(library: GaitLibrary) -> dict[str, Any]:
     return arrays
 
 
-def from_arrays(arrays: Mapping[str, Any]) -> GaitLibrary:
-    """Make a library from the arrays of `to_arrays`; a missing or misshapen one raises."""
-    metadata = json.loads(str(arrays["metadata"]))
-    names = [str(name) for name in arrays["phases"]]
-    feet = [tuple(filter(None, str(names).split(","))) for names in arrays["feet"]]
-    gaits = []
-    for k, speed in enumerate(arrays["speed"]):
-        phases = []
-        for name, standing in zip(names, feet, strict=True):
-            coefficients = {key: np.array(arrays[f"{name}.{key}"][k]) for key in ARRAYS}
-            duration = float(arrays[f"{name}.duration"][k])
-            finite = all(np.all(np.isfinite(array)) for array in coefficients.values())
-            if not (finite and np.isfinite(duration)):
-                raise ValueError(f"{name} at {speed:g} m/s is not finite")
-            phases.append(GaitPhase(name, standing, duration, **coefficients))
-        apex = float(arrays["apex"][k])
-        gaits.append(Gait(metadata["robot"], float(speed), apex, tuple(phases)))
-    entries = json.loads(str(arrays["audit"]))
-    audits = []
-    if entries:
-        audits = [
-            Audit.from_json(gait.speed, entry) for gait, entry in zip(gaits, entries, strict=True)
+def from_arrays(arrays: StoredArrays) -> GaitLibrary:
+    """Put a library together again.
+
+    Raises:
+        FileProblem: An array is missing, or not what it should be.
+    """
+    metadata = _metadata(arrays)
+    audits = arrays.as_type(arrays.document("audit"), list[StoredAudit])
+    try:
+        gaits = _gaits(arrays, metadata["robot"])
+        found = tuple(
+            Audit.from_stored(gait.speed, stored)
+            for gait, stored in zip(gaits, audits, strict=False)  # their number is checked below
+        )
+        if len(found) != len(audits):
+            raise arrays.damaged(f"{len(audits)} audits for {len(gaits)} gaits")
+        return GaitLibrary(gaits, metadata, found, float(arrays.numbers("default_apex")))
+    except InvalidInput as error:
+        raise arrays.damaged(error) from error
+
+
+def _gaits(arrays: StoredArrays, robot: str) -> tuple[Gait, ...]:
+    speeds = arrays.numbers("speed", None)
+    n = len(speeds)
+    apexes = arrays.numbers("apex", n)
+    names = arrays.texts("phases")
+    feet = [tuple(filter(None, text.split(","))) for text in arrays.texts("feet")]
+    if not n or not names or len(set(names)) < len(names) or len(feet) != len(names):
+        raise arrays.damaged(f"{n} gaits of phases {names} on feet {feet}")
+    phases: list[list[GaitPhase]] = [[] for _ in speeds]
+    for name, standing in zip(names, feet, strict=True):
+        durations = arrays.numbers(f"{name}.duration", n)
+        if np.any(durations <= 0.0):
+            raise arrays.damaged(f"{name} without duration")
+        joints = arrays.numbers(f"{name}.joints", n, NL, None)
+        order = joints.shape[-1]
+        parts = [
+            joints,
+            arrays.numbers(f"{name}.base", n, 3, order),
+            arrays.numbers(f"{name}.tau", n, NL, order),
+            arrays.numbers(f"{name}.lam", n, 4, 3, order),
         ]
-    return GaitLibrary(tuple(gaits), metadata, tuple(audits), float(arrays["default_apex"]))
+        if not order:
+            raise arrays.damaged(f"{name} without coefficients")
+        for k, duration in enumerate(durations):
+            coefficients = (part[k].copy() for part in parts)
+            phases[k].append(GaitPhase(name, standing, float(duration), *coefficients))
+    return tuple(
+        Gait(robot, float(speed), float(apex), tuple(of_gait))
+        for speed, apex, of_gait in zip(speeds, apexes, phases, strict=True)
+    )
+
+
+class _Problem(TypedDict, total=False):
+    """What is read of the problem that the gaits solve."""
+
+    base: Base
+    contact: Contact
+    friction: float
+
+
+class _OfRobot(TypedDict):
+    robot: str
+
+
+class _Metadata(_OfRobot, total=False):
+    """What is read of the metadata."""
+
+    urdf_sha256: str
+    gait: str
+    problem: _Problem
+    bezier_orders: dict[str, list[tuple[float, float, float]]]
+    cost: list[float]
+    iterations: list[int]
+    solve_time: list[float]
+    work_time: list[float]
+
+
+def _metadata(arrays: StoredArrays) -> dict[str, Any]:
+    metadata: dict[str, Any] = arrays.document("metadata")
+    arrays.as_type(metadata, _Metadata)
+    n = len(arrays.numbers("speed", None))
+    for name in PER_GAIT:
+        if len(metadata.get(name, [0.0] * n)) != n:
+            raise arrays.damaged(f"{len(metadata[name])} values of {name} for {n} gaits")
+    return metadata
 
 
 def _check_model(path: Path, library: GaitLibrary, robot: Robot | None) -> None:

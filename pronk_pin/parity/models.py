@@ -11,25 +11,28 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
-import pinocchio as pin
 
 from .._checks import NOT_NEGATIVE, instance_of, real, whole
+from .._mjcf import loading, read_mjcf
 from .._typing import Array
-from ..errors import FileProblem, InvalidInput, reading
+from .._urdf_file import read_urdf
+from ..errors import FileProblem, InvalidInput
 from ..robot import Robot
+from ..storage import from_text, read_xml
 from .mechanism import FLOATING, Mechanism, Point, State, read_pinocchio
 from .mechanism_mujoco import read_mujoco
 from .table import Row, compare_tables, format_table, format_value
 
 Model: TypeAlias = Robot | str | Path | mujoco.MjModel
 """Kinds of models that can be compared."""
+
+_GIVE = "give the path of a URDF or an MJCF"
 
 ROUND_OFF = 1e-9
 """Relative tolerance for models with all their digits."""
@@ -91,10 +94,8 @@ class Parity:
         Raises:
             InvalidInput: The text is something else.
         """
-        with reading("a comparison of models", "make it again"):
-            values = json.loads(text)
-            rows = tuple(Row(**_read_again(row)) for row in values["rows"])
-            return cls(**{**values, "rows": rows})
+        stored = from_text(text, _Stored, "a comparison of models", "make it again")
+        return cls(**{**vars(stored), "rows": tuple(map(_restored, stored.rows))})
 
     def table(self, *, full: bool = False) -> str:
         """The comparison as text.
@@ -201,18 +202,50 @@ def _written(value: Any) -> Any:
     return value
 
 
-def _read_again(row: dict[str, Any]) -> dict[str, Any]:
-    """The values of a row as they were before `_written`."""
+_Word: TypeAlias = float | str | None
+"""A value as JSON has it; infinity is a word."""
+
+
+@dataclass(frozen=True)
+class _StoredRow:
+    """A row as `_written` leaves it."""
+
+    what: str
+    where: str
+    a: _Word | tuple[_Word, ...]
+    b: _Word | tuple[_Word, ...]
+    difference: _Word
+    unit: str
+    agrees: bool | None
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """A comparison as `_written` leaves it."""
+
+    a: str
+    b: str
+    rows: tuple[_StoredRow, ...]
+    states: int
+    tolerance: float
+    mass_matrix: _Word
+    bias: _Word
+    jacobian: _Word
+    reason: str
+
+
+def _restored(row: _StoredRow) -> Row:
+    """A row as it was before `_written`."""
 
     def number(value: Any) -> Any:
         return float(value) if value in ("inf", "-inf") else value
 
-    values = {
-        key: tuple(map(number, value)) if isinstance(value, list) else number(value)
-        for key, value in row.items()
+    values: dict[str, Any] = {
+        key: tuple(map(number, value)) if isinstance(value, tuple) else number(value)
+        for key, value in vars(row).items()
     }
     missing = values["difference"] is None
-    return {**values, "difference": math.nan if missing else values["difference"]}
+    return Row(**{**values, "difference": math.nan if missing else values["difference"]})
 
 
 def _obstacle(a: Mechanism, b: Mechanism) -> str:
@@ -290,42 +323,19 @@ def _model_name(model: mujoco.MjModel) -> str:
 
 def _read_file(path: Path) -> Mechanism:
     """Read a URDF by Pinocchio or an MJCF by MuJoCo, as its first element tells."""
-    try:
-        root = ElementTree.parse(path).getroot().tag
-    except OSError as error:
-        raise FileProblem(
-            path, f"cannot be read ({error.strerror})", "give the path of a URDF or an MJCF"
-        ) from error
-    except (ElementTree.ParseError, ValueError) as error:
-        raise FileProblem(
-            path, f"not XML ({error})", "give the path of a URDF or an MJCF"
-        ) from error
+    root = read_xml(path, _GIVE).tag
     if root == "robot":
-        try:
-            model = pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer())
-        except (ValueError, RuntimeError) as error:
-            raise FileProblem(path, f"not a usable URDF ({error})", "check the file") from error
-        return read_pinocchio(model, f"{path} (Pinocchio)")
+        return read_pinocchio(read_urdf(path).model, f"{path} (Pinocchio)")
     if root != "mujoco":
         raise FileProblem(
             path,
             f"neither a URDF nor an MJCF (it begins with <{root}>)",
             "give a file that begins with <robot> or <mujoco>",
         )
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        six_digits = _has_six_digits(spec)
+    spec = read_mjcf(path)
+    six_digits = _has_six_digits(spec)
+    with loading(path, "correct what it names"):
         compiled = spec.compile()
-    except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
-        missing = "rror opening file" in reason or "not found" in reason
-        raise FileProblem(
-            path,
-            f"MuJoCo cannot load it ({reason})",
-            "put the meshes and files it names beside it, where its meshdir says"
-            if missing
-            else "correct what it names",
-        ) from error
     return read_mujoco(compiled, f"{path} (MuJoCo)", round_off=SIX_DIGITS if six_digits else 0.0)
 
 

@@ -13,13 +13,13 @@ import os
 import select
 import shutil
 import subprocess
-import tempfile
 import time
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from ..errors import NoBrowser
+from ..storage import temporary_folder
 
 VARIABLE = "PRONK_PIN_BROWSER"
 """Environment variable that names the browser's program."""
@@ -64,17 +64,16 @@ class Browser:
     def __init__(self, width: int = 800, height: int = 600) -> None:
         self._program = find_browser()
         self.errors: list[str] = []
-        self._profile = tempfile.TemporaryDirectory(
-            prefix="pronk_pin-browser-", ignore_cleanup_errors=True
-        )
-        command = [self._program, *_FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"]
+        self._resources = contextlib.ExitStack()
+        profile = self._resources.enter_context(temporary_folder())
+        command = [self._program, *_FLAGS, f"--user-data-dir={profile}", "about:blank"]
         command.insert(1, f"--window-size={width},{height}")
         if os.geteuid() == 0:
             command.insert(1, "--no-sandbox")  # which it refuses to have for root, in containers
         theirs_in, self._to = os.pipe()
         self._from, theirs_out = os.pipe()
         self._count, self._session, self._buffer = 0, "", b""
-        self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed in close
+        self._log = self._resources.enter_context((profile / "log").open("wb+"))
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,
@@ -177,8 +176,7 @@ class Browser:
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()
-        self._log.close()
-        self._profile.cleanup()
+        self._resources.close()
 
     def _attach(self) -> None:
         """Speak with the page from here on."""

@@ -10,7 +10,8 @@ from string import Template
 
 from .._checks import path as known_path
 from .._checks import real
-from ..errors import InvalidInput, cannot_write
+from ..errors import InvalidInput
+from ..storage import write_file
 from .documents import FPS, film_blob, robot_blob
 from .page import page, player_source, viewer_source
 from .programme import Choice, Programme
@@ -58,13 +59,7 @@ def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS
         InvalidInput: fps is not positive.
     """
     path = known_path("path", path)
-    html = replay_html(shown, fps=fps)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(html, encoding="utf-8")
-    except OSError as error:
-        raise cannot_write(path, error, "choose another path") from error
-    return path
+    return write_file(path, replay_html(shown, fps=fps), remedy="choose another path")
 
 
 def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:

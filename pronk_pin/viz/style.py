@@ -18,7 +18,8 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..errors import InvalidInput, cannot_write
+from ..errors import InvalidInput
+from ..storage import write_file
 
 PALETTE = {
     "black": "#000000",
@@ -200,9 +201,4 @@ def save_figure(figure: Figure, path: Path) -> Path:
         FileProblem: It cannot be written.
     """
     data = figure_bytes(figure, path.suffix.removeprefix("."))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
-    except OSError as error:
-        raise cannot_write(path, error, "choose another folder") from error
-    return path
+    return write_file(path, data, remedy="choose another folder")

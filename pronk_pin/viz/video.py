@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +16,7 @@ from tqdm import tqdm
 
 from .._checks import flag, none_or, real, text, whole
 from ..errors import FileProblem, InvalidInput, cannot_write
+from ..storage import partial_path, temporary_folder, write_file
 from .browser import Browser
 from .replay import write_replay
 from .scene import Scene
@@ -81,7 +82,7 @@ def write_png(scene: Scene, path: Path | str, film: Film | None = None) -> Path:
     film = Film() if film is None else film
     path = _writable(path)
     with _Stage(scene, film) as stage:
-        _save(path, stage.picture(film.at))
+        write_file(path, stage.picture(film.at))
     return path
 
 
@@ -117,13 +118,13 @@ class _Stage:
     """A scene's page in a browser, made for pictures; a context manager."""
 
     def __init__(self, scene: Scene, film: Film) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="pronk_pin-film-")
+        self._resources = contextlib.ExitStack()
         self._browser: Browser | None = None
         try:
             # As many frames as the film shows; between them the page interpolates.
-            page = Path(self._folder.name) / "page.html"
+            page = self._resources.enter_context(temporary_folder()) / "page.html"
             write_replay(scene, page, fps=max(60.0, film.fps / film.rate))
-            self._browser = Browser(film.width, film.height)
+            self._browser = self._resources.enter_context(Browser(film.width, film.height))
             self._browser.open(f"{page.as_uri()}#t={film.at}")
             kind = "film plots" if film.plots else "film"
             self._browser.run(
@@ -137,9 +138,7 @@ class _Stage:
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._browser is not None:
-            self._browser.close()
-        self._folder.cleanup()
+        self._resources.close()
 
     def picture(self, time: float) -> bytes:
         """The page at a time from the scene's beginning [s], as PNG."""
@@ -165,26 +164,21 @@ def _write_gif(path: Path, pictures: Iterator[Image.Image], film: Film) -> None:
     duration = max(10 * round(100.0 / film.fps), 20)
     options: dict[str, Any] = {"append_images": frames[1:], "duration": duration, "loop": 0}
     frames[0].save(buffer, format="gif", save_all=True, optimize=False, **options)
-    _save(path, buffer.getvalue())
+    write_file(path, buffer.getvalue())
 
 
 def _write_mp4(path: Path, pictures: Iterator[Image.Image], film: Film) -> None:
     """Write a video, H.264."""
-    partial = path.with_name(f"{path.stem}.partial.mp4")
-    writer = _encoder().write_frames(
-        str(partial), (film.width, film.height), fps=film.fps, quality=7, macro_block_size=2
-    )
-    try:
-        writer.send(None)
-        for picture in pictures:
-            writer.send(np.ascontiguousarray(picture))
-        writer.close()
-        partial.replace(path)
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    finally:
-        writer.close()
-        partial.unlink(missing_ok=True)
+    with partial_path(path) as partial:
+        writer = _encoder().write_frames(
+            str(partial), (film.width, film.height), fps=film.fps, quality=7, macro_block_size=2
+        )
+        try:
+            writer.send(None)
+            for picture in pictures:
+                writer.send(np.ascontiguousarray(picture))
+        finally:
+            writer.close()
 
 
 def _encoder() -> Any:
@@ -217,10 +211,3 @@ def _writable(path: Path | str) -> Path:
     if path.is_dir() or not os.access(path if path.exists() else path.parent, os.W_OK):
         raise FileProblem(path, "cannot be written", "choose another path")
     return path
-
-
-def _save(path: Path, data: bytes) -> None:
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise cannot_write(path, error) from error

@@ -190,12 +190,22 @@ def test_a_trunk_that_is_bolted_down_is_refused(robot: Robot, tmp_path: Path) ->
         mjcf_spec(robot, path)
 
 
-@pytest.mark.parametrize("text", [None, "no XML", "<mujoco><worldbody><body/></mujoco>"])
-def test_a_file_that_is_no_mjcf_is_refused(robot: Robot, tmp_path: Path, text: str | None) -> None:
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (None, "missing"),
+        ("no XML", "damaged MJCF"),
+        ("<mujoco><worldbody><body/></mujoco>", "damaged MJCF"),
+        ("<mujoco><worldbody><bone/></worldbody></mujoco>", "MuJoCo cannot load it"),
+    ],
+)
+def test_a_file_that_is_no_mjcf_is_refused(
+    robot: Robot, tmp_path: Path, text: str | None, problem: str
+) -> None:
     path = tmp_path / "robot.xml"
     if text is not None:
         path.write_text(text)
-    with pytest.raises(FileProblem, match=r"robot.xml: MuJoCo cannot load it"):
+    with pytest.raises(FileProblem, match=f"robot.xml: {problem}"):
         mjcf_spec(robot, path)
 
 
@@ -238,7 +248,7 @@ def test_a_result_is_completed_with_the_same_file_and_no_other(robot: Robot, run
         run_experiment(run.experiment, run.folder, progress=False)
     assert caught.value.path == path
     path.unlink()
-    with pytest.raises(FileProblem, match=r"robot.xml: MuJoCo cannot load it"):
+    with pytest.raises(FileProblem, match=r"robot.xml: missing"):
         run_experiment(run.experiment, run.folder, progress=False)
     path.write_text(as_it_was)
     run_experiment(run.experiment, run.folder, progress=False)
@@ -248,7 +258,7 @@ def test_a_result_is_completed_with_the_same_file_and_no_other(robot: Robot, run
 def test_a_file_that_cannot_be_taken_leaves_no_folder(robot: Robot, tmp_path: Path) -> None:
     path = tmp_path / "robot.xml"
     experiment = replace(SMALL, world=str(path))
-    with pytest.raises(FileProblem, match=r"robot.xml: MuJoCo cannot load it"):
+    with pytest.raises(FileProblem, match=r"robot.xml: missing"):
         run_experiment(experiment, tmp_path / "run", progress=False)
     mjcf(load_robot("solo12"), path)
     with pytest.raises(InvalidInput, match="has no joint FL_hip_joint, FL_thigh_joint"):

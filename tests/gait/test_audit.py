@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from pronk_pin.dynamics import planar_dynamics
+from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import Audit, GaitSolution, audit, bezier_orders
-from pronk_pin.gait.checks import Check
+from pronk_pin.gait.checks import Check, StoredAudit
+from pronk_pin.storage import as_type
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,8 @@ def test_a_wrong_torque_is_caught(solution: GaitSolution) -> None:
 
 
 def test_library_keeps_every_value(report: Audit) -> None:
-    again = Audit.from_json(report.speed, json.loads(json.dumps(report.as_json())))
+    document = json.loads(json.dumps(report.as_json()))
+    again = Audit.from_stored(report.speed, as_type(document, StoredAudit, "x", "again"))
     assert again == report
     assert "FAILED" not in again.table()
 
@@ -42,12 +45,18 @@ def test_every_check_says_where_it_is_worst(report: Audit) -> None:
 
 
 def test_an_audit_without_a_check_is_damage(report: Audit) -> None:
-    entries = report.as_json()
-    del entries["stance drift"]
-    with pytest.raises(KeyError, match="audit without stance drift"):
-        Audit.from_json(0.3, entries)
-    with pytest.raises(KeyError, match="beauty"):
-        Audit.from_json(0.3, {**report.as_json(), "beauty": [1.0, ""]})
+    checks = report.as_json()["checks"]
+    less = {name: found for name, found in checks.items() if name != "stance drift"}
+    with pytest.raises(InvalidInput, match="audit without stance drift"):
+        Audit.from_stored(0.3, StoredAudit(report.motion, less))
+    for stranger in ("beauty", "violation: beauty"):
+        more = {**checks, stranger: (1.0, "")}
+        with pytest.raises(InvalidInput, match=f"'{stranger}' that is not known"):
+            Audit.from_stored(0.3, StoredAudit(report.motion, more))
+
+
+def test_an_audit_says_which_motion_it_is_of(solution: GaitSolution, report: Audit) -> None:
+    assert report.motion == solution.gait.sha256
 
 
 def test_a_limit_may_be_used_in_full_but_not_exceeded() -> None:

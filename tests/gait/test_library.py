@@ -21,8 +21,10 @@ from pronk_pin.gait import (
     load_library,
     load_style,
 )
+from pronk_pin.gait.library import SCHEMA, to_arrays
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot
+from pronk_pin.storage import write_arrays
 
 S = np.linspace(0.0, 1.0, 101)
 ENDS = np.array([0.0, 1.0])
@@ -214,9 +216,9 @@ def test_damaged_files_are_named(library: GaitLibrary, tmp_path: Path) -> None:
     path.write_bytes(content[: len(content) // 2])
     with pytest.raises(FileProblem, match=r"gaits.npz: damaged gait library.*gaits build"):
         GaitLibrary.load(path)
-    with pytest.raises(FileProblem, match="no such gait library"):
+    with pytest.raises(FileProblem, match=r"absent.npz: missing.*gaits build"):
         GaitLibrary.load(tmp_path / "absent.npz")
-    with pytest.raises(FileProblem, match="no such gait library"):
+    with pytest.raises(FileProblem, match=r"no such gait library is shipped.*gaits build"):
         load_library("a robot without gaits")
 
 
@@ -227,6 +229,65 @@ def test_numbers_that_are_not_finite_are_damage(library: GaitLibrary, tmp_path: 
     path = GaitLibrary((gait,)).save(tmp_path / "nan.npz")
     with pytest.raises(FileProblem, match="not finite"):
         GaitLibrary.load(path)
+
+
+def scaled(gait: Gait, factor: float) -> Gait:
+    stance = dataclasses.replace(gait.stance, joints=gait.stance.joints * factor)
+    return dataclasses.replace(gait, phases=(stance, *gait.phases[1:]))
+
+
+def test_an_audit_proves_the_motion_that_it_was_made_for_and_no_other(
+    library: GaitLibrary,
+) -> None:
+    gaits = list(library.gaits)
+    k = library.index(0.3)
+    for factor in (1.05, 1.0 + 1e-15):
+        changed = (*gaits[:k], scaled(gaits[k], factor), *gaits[k + 1 :])
+        with pytest.raises(InvalidInput, match=r"gait at 0.3 m/s is not the one that was audited"):
+            dataclasses.replace(library, gaits=changed)
+    same = (*gaits[:k], scaled(gaits[k], 1.0), *gaits[k + 1 :])
+    assert dataclasses.replace(library, gaits=same).sha256 == library.sha256
+    with pytest.raises(ValueError, match="read-only"):
+        gaits[k].stance.joints[0, 0] = 1.0
+
+
+def test_a_file_whose_motion_was_changed_is_refused(library: GaitLibrary, tmp_path: Path) -> None:
+    """Even where who changed it has sealed it again."""
+    arrays = to_arrays(library)
+    arrays["stance.joints"] = 1.05 * arrays["stance.joints"]
+    path = write_arrays(tmp_path / "changed.npz", arrays, schema=SCHEMA)
+    with pytest.raises(FileProblem, match=r"gait at -0.5 m/s is not the one that was audited"):
+        GaitLibrary.load(path)
+
+
+@pytest.mark.parametrize("name", ["robot", "speed", "apex", "phases"])
+def test_everything_about_a_motion_is_in_its_digest(library: GaitLibrary, name: str) -> None:
+    gait = library.gaits[0]
+    stance, flight = gait.phases
+    others = {
+        "robot": ["b1"],
+        "speed": [np.nextafter(gait.speed, 1.0)],
+        "apex": [np.nextafter(gait.apex, 1.0)],
+        "phases": [
+            (dataclasses.replace(stance, **change), flight)
+            for change in (
+                {"name": "support"},
+                {"feet": ("FL",)},
+                {"duration": np.nextafter(stance.duration, 1.0)},
+                {"lam": np.nextafter(stance.lam, 1e9)},
+                {"base": stance.base[:, ::-1]},
+            )
+        ],
+    }
+    digests = [dataclasses.replace(gait, **{name: other}).sha256 for other in others[name]]
+    assert len({gait.sha256, *digests}) == 1 + len(others[name])
+
+
+def test_libraries_with_other_gaits_have_other_digests(library: GaitLibrary) -> None:
+    whole = load_library()
+    digests = {whole.at_apex(apex).sha256 for apex in whole.apexes} | {whole.sha256}
+    assert len(digests) == 1 + len(whole.apexes)
+    assert GaitLibrary(library.gaits, library.metadata).sha256 == library.sha256
 
 
 def test_speeds_must_increase(library: GaitLibrary) -> None:

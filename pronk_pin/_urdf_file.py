@@ -1,0 +1,67 @@
+"""URDF files: the document, and Pinocchio's model of it, read once and of the same bytes."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from .errors import FileProblem
+from .storage import LARGEST_DOCUMENT, damaged, parse_xml, read_bytes
+
+_CHECK = "check the file"
+
+_LARGEST = 1e6
+"""Masses [kg], lengths [m] and inertias [kg m^2] beyond which nothing is a robot."""
+
+
+class Urdf(NamedTuple):
+    """A URDF.
+
+    Attributes:
+        data: The bytes of the file.
+        root: The document.
+        model: Pinocchio's model with a floating base.
+    """
+
+    data: bytes
+    root: ElementTree.Element
+    model: pin.Model
+
+
+def read_urdf(path: Path) -> Urdf:
+    """Read a URDF.
+
+    Raises:
+        FileProblem: It cannot be read, is none, or has numbers that are none of a robot.
+    """
+    data = read_bytes(path, _CHECK, limit=LARGEST_DOCUMENT)
+    root = parse_xml(data, path, _CHECK, what="URDF")
+    try:
+        # What Pinocchio calls does not read declarations of encodings, only UTF-8.
+        text = data.decode()
+        model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+    except Exception as error:
+        reason = " ".join(str(error).split())
+        raise FileProblem(path, f"not a usable URDF ({reason})", _CHECK) from error
+    _check_numbers(path, model)
+    return Urdf(data, root, model)
+
+
+def _check_numbers(path: Path, model: pin.Model) -> None:
+    for name, inertia, placement in zip(
+        model.names, model.inertias, model.jointPlacements, strict=True
+    ):
+        numbers = np.concatenate(
+            [[inertia.mass], inertia.lever, inertia.inertia.ravel(), placement.homogeneous.ravel()]
+        )
+        if not np.all(np.abs(numbers) < _LARGEST) or inertia.mass < 0.0:
+            reason = f"mass, inertia or place of joint {name} and its link are none of a robot"
+            raise damaged(path, reason, _CHECK, what="URDF")
+    limits = (model.lowerPositionLimit, model.upperPositionLimit)
+    for bounds in (*limits, model.velocityLimit, model.effortLimit):
+        if np.any(np.isnan(bounds)):
+            raise damaged(path, "a joint's limit is not a number", _CHECK, what="URDF")
