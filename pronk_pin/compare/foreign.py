@@ -17,7 +17,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from .._mjcf import loading, read_mjcf
+from .._mjcf import check_mjcf, loading, read_mjcf
 from ..errors import InvalidInput
 from ..parity import SIX_DIGITS, Parity, compare_models
 from ..robot import Robot
@@ -121,7 +121,7 @@ def mjcf_sha256(path: Path | str) -> str:
         FileProblem: It cannot be read.
     """
     path = Path(path).expanduser()
-    read_mjcf(path)
+    check_mjcf(path)
     with loading(path):
         others = sorted({Path(name) for name in mujoco.mju_getXMLDependencies(str(path))} - {path})
     files = [path, *(other for other in others if other.is_file())]
