@@ -38,10 +38,7 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
     Raises:
         FileProblem: It, or a file that it names, is missing, damaged or too large, or it is none.
     """
-    root = read_xml(path, _GIVE, what="MJCF")
-    if root.tag != "mujoco":
-        raise damaged(path, f"it begins with <{root.tag}>", _GIVE, what="MJCF")
-    _look(path, root)
+    check_mjcf(path)
     with loading(path):
         spec = mujoco.MjSpec.from_file(str(path))
     if spec.memory > _LARGEST_MEMORY:
@@ -70,8 +67,15 @@ def loading(path: Path, remedy: str = _GIVE) -> Iterator[None]:
         ) from error
 
 
-def _look(path: Path, root: ElementTree.Element) -> None:
-    """Refuse what MuJoCo would wait for, or run out of memory with."""
+def check_mjcf(path: Path) -> None:
+    """Refuse what is no MJCF, or what MuJoCo would wait for or run out of memory with.
+
+    Raises:
+        FileProblem: It is so, or a file that it names.
+    """
+    root = read_xml(path, _GIVE, what="MJCF")
+    if root.tag != "mujoco":
+        raise damaged(path, f"it begins with <{root.tag}>", _GIVE, what="MJCF")
     seen, waiting, elements = {path.resolve()}, [(path, root)], 0
     folders = {path.parent}
     named: list[str] = []

@@ -45,6 +45,9 @@ LARGEST_ARRAYS = 2**28
 LARGEST_DOCUMENT = 2**24
 """Size beyond which no XML is read [bytes]; robots have a hundred kilobytes."""
 
+REINSTALL = "it comes with the package: install that again"
+"""The remedy for files that nobody but an installer writes."""
+
 _DEEPEST = 200
 """Elements within elements beyond which no XML is read: libraries in C follow them by recursion."""
 

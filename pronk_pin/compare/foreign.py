@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from .._checks import path as known_path
-from .._mjcf import loading, read_mjcf
+from .._mjcf import check_mjcf, loading, read_mjcf
 from .._state import as_robot
 from ..errors import InvalidInput
 from ..parity import SIX_DIGITS, Parity, compare_models
@@ -124,7 +124,7 @@ def mjcf_sha256(path: Path | str) -> str:
         FileProblem: It cannot be read.
     """
     path = known_path("path", path).expanduser()
-    read_mjcf(path)
+    check_mjcf(path)
     with loading(path):
         others = sorted({Path(name) for name in mujoco.mju_getXMLDependencies(str(path))} - {path})
     files = [path, *(other for other in others if other.is_file())]

@@ -6,12 +6,16 @@ from importlib import resources
 
 import pandas as pd
 
+from ..storage import REINSTALL, read_csv, reading
+
 
 def table_1() -> pd.DataFrame:
     """Peak errors [rad] as printed: columns `speed`, `joint`, `controller`, `value`."""
     source = resources.files(__package__) / "data" / "paper_table1.csv"
-    with source.open() as file:
-        wide = pd.read_csv(file)
+    with resources.as_file(source) as path:
+        heading, *rows = read_csv(path, REINSTALL)
+        with reading(path, REINSTALL):
+            wide = pd.DataFrame(rows, columns=heading).astype(float)
     parts = [
         pd.DataFrame(
             {

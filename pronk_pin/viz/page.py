@@ -6,6 +6,8 @@ import html
 from importlib import resources
 from string import Template
 
+from ..storage import REINSTALL, read_text
+
 
 def page(title: str, script: str) -> str:
     """The page.
@@ -20,8 +22,7 @@ def page(title: str, script: str) -> str:
 
 def viewer_source() -> str:
     """MeshCat's viewer, one JavaScript file."""
-    source = resources.files("meshcat").joinpath("viewer/dist/main.min.js")
-    return source.read_text(encoding="utf-8")
+    return _text("meshcat", "viewer/dist/main.min.js")
 
 
 def player_source() -> str:
@@ -30,4 +31,9 @@ def player_source() -> str:
 
 
 def _data(name: str) -> str:
-    return resources.files(__package__).joinpath(f"data/{name}").read_text(encoding="utf-8")
+    return _text(__package__, f"data/{name}")
+
+
+def _text(package: str, name: str) -> str:
+    with resources.as_file(resources.files(package).joinpath(name)) as path:
+        return read_text(path, REINSTALL)
