@@ -18,6 +18,7 @@ from pronk_pin.inverse_dynamics import (
     GUIDE_COORDINATES,
     SAGITTAL_GUIDE,
     InverseDynamics,
+    distribute_wrench,
     feedforward,
     inverse_dynamics,
 )
@@ -27,7 +28,7 @@ from pronk_pin.inverse_dynamics.problem import (
     force_problem,
     saddle_point,
 )
-from pronk_pin.inverse_dynamics.qp import _Chain, cone_sides
+from pronk_pin.inverse_dynamics.qp import _Chain, cone_edges, cone_sides
 
 Draw = Callable[..., tuple[Array, Array, Array, Array]]
 
@@ -304,3 +305,25 @@ def test_wrong_arguments_are_refused_with_a_remedy(robot: Robot) -> None:
         inverse_dynamics(robot, *state, guide=("y", "y"))
     with pytest.raises(InvalidInput, match="samples=1; give a whole number from 2 to 100000"):
         feedforward(robot, hop(robot), samples=1)
+
+
+def test_forces_within_cones_are_the_same_to_the_bit_wherever_their_memory_lies() -> None:
+    rng = np.random.default_rng(0)
+    arms = rng.uniform(-0.3, 0.3, (20, 4, 3))
+    nominal = np.tile([5.0, 0.0, 30.0], (20, 4, 1))
+    wrench = rng.normal(0.0, [60.0, 60.0, 20.0, 8.0, 8.0, 8.0], (20, 6))
+    seen, kept = set(), []
+    for size in rng.integers(1, 3000, 40):
+        kept.append(np.empty(int(size)))  # moves what is allocated next
+        forces = distribute_wrench(arms, wrench, nominal, friction=0.4)
+        seen.add(forces.tobytes())
+    assert len(seen) == 1
+    side = np.hypot(forces[..., 0], forces[..., 1])
+    assert np.all(side <= 0.4 * forces[..., 2] + 1e-9)
+
+
+def test_edges_of_the_pyramids_are_where_their_sides_meet() -> None:
+    sides, edges = cone_sides(0.6, 2), cone_edges(0.6, 2)
+    gap = sides @ edges  # (16, 16): 0 on two sides of its own pyramid, below on the others
+    assert np.all(gap < 1e-12)
+    assert np.all((np.abs(gap) < 1e-12).sum(axis=0) == 2 + 8)

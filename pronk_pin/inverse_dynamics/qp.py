@@ -42,6 +42,13 @@ def cone_sides(friction: float, feet: int) -> Array:
     return np.kron(np.eye(feet), np.stack([np.cos(angle), np.sin(angle), height], axis=-1))
 
 
+def cone_edges(friction: float, feet: int) -> Array:
+    """Columns E whose sums with weights of 0 or more are these forces, shape (3 feet, 8 feet)."""
+    angle = 2.0 * np.pi / _SIDES * np.arange(_SIDES)
+    edges = np.stack([friction * np.cos(angle), friction * np.sin(angle), np.ones(_SIDES)])
+    return np.kron(np.eye(feet), edges)
+
+
 def constrained_forces(
     problem: ForceProblem, conditions: SaddlePoint, rows: IntArray, friction: float, tau_max: Array
 ) -> Array:
