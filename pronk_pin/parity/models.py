@@ -14,7 +14,7 @@ import math
 import operator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import mujoco
 import numpy as np
@@ -199,8 +199,11 @@ def _written(value: Any) -> Any:
     return value
 
 
+_Number: TypeAlias = float | Literal["inf", "-inf"] | None
+"""A number as JSON has it: infinity is a word, and NaN is null."""
+
 _Word: TypeAlias = float | str | None
-"""A value as JSON has it; infinity is a word."""
+"""A value as JSON has it."""
 
 
 @dataclass(frozen=True)
@@ -209,9 +212,9 @@ class _StoredRow:
 
     what: str
     where: str
-    a: _Word | tuple[_Word, ...]
-    b: _Word | tuple[_Word, ...]
-    difference: _Word
+    a: _Word | tuple[_Number, ...]
+    b: _Word | tuple[_Number, ...]
+    difference: _Number
     unit: str
     agrees: bool | None
 
@@ -225,9 +228,9 @@ class _Stored:
     rows: tuple[_StoredRow, ...]
     states: int
     tolerance: float
-    mass_matrix: _Word
-    bias: _Word
-    jacobian: _Word
+    mass_matrix: _Number
+    bias: _Number
+    jacobian: _Number
     reason: str
 
 
