@@ -19,7 +19,7 @@ from .storage import LARGEST_DOCUMENT, damaged, parse_xml, read_bytes
 
 _CHECK = "check the file"
 
-_LARGEST = 1e6
+LARGEST_QUANTITY = 1e6
 """Masses [kg], lengths [m] and inertias [kg m^2] beyond which nothing is a robot."""
 
 
@@ -84,7 +84,7 @@ def _check_numbers(path: Path, model: pin.Model) -> None:
         numbers = np.concatenate(
             [[inertia.mass], inertia.lever, inertia.inertia.ravel(), placement.homogeneous.ravel()]
         )
-        if not np.all(np.abs(numbers) < _LARGEST) or inertia.mass < 0.0:
+        if not np.all(np.abs(numbers) < LARGEST_QUANTITY) or inertia.mass < 0.0:
             reason = f"mass, inertia or place of joint {name} and its link are none of a robot"
             raise damaged(path, reason, _CHECK, what="URDF")
     limits = (model.lowerPositionLimit, model.upperPositionLimit)

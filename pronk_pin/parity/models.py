@@ -19,7 +19,7 @@ from typing import Any, Literal, TypeAlias
 import mujoco
 import numpy as np
 
-from .._mjcf import loading, read_mjcf
+from .._mjcf import compile_mjcf, read_mjcf
 from .._typing import Array
 from .._urdf_file import read_urdf
 from ..errors import FileProblem, InvalidInput
@@ -241,7 +241,9 @@ def _restored(row: _StoredRow) -> Row:
         return float(value) if value in ("inf", "-inf") else value
 
     values: dict[str, Any] = {
-        key: tuple(map(number, value)) if isinstance(value, tuple) else number(value)
+        key: tuple(math.nan if part is None else number(part) for part in value)
+        if isinstance(value, tuple)
+        else number(value)
         for key, value in vars(row).items()
     }
     missing = values["difference"] is None
@@ -334,8 +336,7 @@ def _read_file(path: Path) -> Mechanism:
         )
     spec = read_mjcf(path)
     six_digits = _has_six_digits(spec)
-    with loading(path, "correct what it names"):
-        compiled = spec.compile()
+    compiled = compile_mjcf(spec, path, "correct what it names")
     return read_mujoco(compiled, f"{path} (MuJoCo)", round_off=SIX_DIGITS if six_digits else 0.0)
 
 
