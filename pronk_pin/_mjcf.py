@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
+from ._urdf_file import LARGEST_QUANTITY
 from .errors import FileProblem
 from .storage import LARGEST_FILE, check_file, damaged, read_xml
 
@@ -44,6 +46,33 @@ def read_mjcf(path: Path) -> mujoco.MjSpec:
     if spec.memory > _LARGEST_MEMORY:
         raise damaged(path, f"it asks for {spec.memory:.1e} bytes of memory", _GIVE, what="MJCF")
     return spec
+
+
+def compile_mjcf(spec: mujoco.MjSpec, path: Path, remedy: str = _GIVE) -> mujoco.MjModel:
+    """The model of an MJCF.
+
+    Raises:
+        FileProblem: MuJoCo cannot make it, or numbers of it are none of a robot.
+    """
+    with loading(path, remedy):
+        model = spec.compile()
+    named = {
+        "mass": model.body_mass,
+        "inertia": model.body_inertia,
+        "place of a body": np.concatenate([model.body_pos, model.body_ipos]),
+        "orientation of a body": np.concatenate([model.body_quat, model.body_iquat]),
+        "place of a joint": model.jnt_pos,
+        "axis of a joint": model.jnt_axis,
+        "armature": model.dof_armature,
+        "damping": model.dof_damping,
+        "friction of a joint": model.dof_frictionloss,
+    }
+    for name, numbers in named.items():
+        if not np.all(np.abs(numbers) < LARGEST_QUANTITY):
+            raise damaged(path, f"a {name} is none of a robot", remedy, what="MJCF")
+    if np.any(np.isnan(model.jnt_range)) or np.any(model.jnt_range[:, 0] > model.jnt_range[:, 1]):
+        raise damaged(path, "limits of a joint are none", remedy, what="MJCF")
+    return model
 
 
 @contextlib.contextmanager
@@ -85,6 +114,7 @@ def check_mjcf(path: Path) -> None:
         if elements > _MOST_ELEMENTS:
             raise damaged(path, "it makes a model of too many elements", _GIVE, what="MJCF")
         for element in tree.iter():
+            _refuse_nan(place, element)
             if element.tag == "compiler":
                 keys = ("meshdir", "texturedir", "assetdir")
                 folders |= {path.parent / element.get(key, "") for key in keys}
@@ -108,6 +138,13 @@ def check_mjcf(path: Path) -> None:
         for folder in folders:
             if _exists(folder / name):
                 check_file(folder / name, _GIVE, limit=LARGEST_FILE)
+
+
+def _refuse_nan(path: Path, element: ElementTree.Element) -> None:
+    """MuJoCo warns of them on stderr, and goes on."""
+    for key, text in element.items():
+        if key not in ("name", "class") and "nan" in text.lower().split():
+            raise damaged(path, f'<{element.tag} {key}="{text}">', _GIVE, what="MJCF")
 
 
 def _exists(path: Path) -> bool:

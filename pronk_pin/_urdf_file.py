@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import sys
+import tempfile
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +19,7 @@ from .storage import LARGEST_DOCUMENT, damaged, parse_xml, read_bytes
 
 _CHECK = "check the file"
 
-_LARGEST = 1e6
+LARGEST_QUANTITY = 1e6
 """Masses [kg], lengths [m] and inertias [kg m^2] beyond which nothing is a robot."""
 
 
@@ -40,15 +45,36 @@ def read_urdf(path: Path) -> Urdf:
     """
     data = read_bytes(path, _CHECK, limit=LARGEST_DOCUMENT)
     root = parse_xml(data, path, _CHECK, what="URDF")
+    said: list[str] = []
     try:
-        # What Pinocchio calls does not read declarations of encodings, only UTF-8.
+        # What Pinocchio calls reads UTF-8 only.
         text = data.decode()
-        model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+        with _overheard(said):
+            model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
     except Exception as error:
-        reason = " ".join(str(error).split())
+        reason = " ".join([*said[:1], *str(error).split()])[:500]
         raise FileProblem(path, f"not a usable URDF ({reason})", _CHECK) from error
     _check_numbers(path, model)
     return Urdf(data, root, model)
+
+
+@contextlib.contextmanager
+def _overheard(said: list[str]) -> Iterator[None]:
+    """Keep what a library in C++ writes to stderr, a line each: it is part of our error's one."""
+    sys.stderr.flush()
+    stderr = os.dup(2)
+    try:
+        with tempfile.TemporaryFile() as kept:
+            os.dup2(kept.fileno(), 2)
+            try:
+                yield
+            finally:
+                os.dup2(stderr, 2)
+                kept.seek(0)
+                lines = kept.read().decode(errors="replace").splitlines()
+                said += [" ".join(line.removeprefix("Error:").split()) for line in lines]
+    finally:
+        os.close(stderr)
 
 
 def _check_numbers(path: Path, model: pin.Model) -> None:
@@ -58,7 +84,7 @@ def _check_numbers(path: Path, model: pin.Model) -> None:
         numbers = np.concatenate(
             [[inertia.mass], inertia.lever, inertia.inertia.ravel(), placement.homogeneous.ravel()]
         )
-        if not np.all(np.abs(numbers) < _LARGEST) or inertia.mass < 0.0:
+        if not np.all(np.abs(numbers) < LARGEST_QUANTITY) or inertia.mass < 0.0:
             reason = f"mass, inertia or place of joint {name} and its link are none of a robot"
             raise damaged(path, reason, _CHECK, what="URDF")
     limits = (model.lowerPositionLimit, model.upperPositionLimit)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 from pronk_pin import storage
-from pronk_pin.errors import FileProblem
+from pronk_pin.errors import FileProblem, InvalidInput
 
 
 def test_a_file_that_cannot_be_completed_leaves_the_old_one_and_nothing_else(
@@ -211,3 +212,156 @@ def test_torn_csv_lines_are_damage(tmp_path: Path) -> None:
         path.write_text(text)
         with pytest.raises(FileProblem, match="damaged"):
             storage.read_csv(path, "make it again")
+
+
+def test_a_library_that_writes_by_name_makes_the_whole_file_or_none(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "film.mp4"
+    with storage.partial_path(path) as partial:
+        assert partial.parent == path.parent
+        assert partial.suffix == ".mp4"
+        partial.write_text("film")
+        assert not path.exists()
+    assert path.read_text() == "film"
+    with pytest.raises(FileProblem, match=r"film.mp4: cannot be written \(No space"):
+        _write_half(path)
+    assert path.read_text() == "film"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def _write_half(path: Path) -> None:
+    with storage.partial_path(path) as partial:
+        partial.write_text("half")
+        raise OSError(28, "No space left on device")
+
+
+def test_a_library_that_wrote_nothing_is_told(tmp_path: Path) -> None:
+    with (
+        pytest.raises(FileProblem, match=r"x.mp4: cannot be written"),
+        storage.partial_path(tmp_path / "x.mp4"),
+    ):
+        pass
+
+
+def test_a_fault_of_ours_while_a_library_writes_is_not_called_a_full_disk(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="ours"), storage.partial_path(tmp_path / "x.mp4"):
+        raise ValueError("ours")
+    assert not list(tmp_path.iterdir())
+
+
+def test_leftovers_with_a_suffix_are_cleared_away_too(tmp_path: Path) -> None:
+    (tmp_path / ".x.mp4.999999999-0.partial.mp4").touch()
+    mine = tmp_path / f".x.mp4.{os.getpid()}-0.partial.mp4"
+    mine.touch()
+    storage.clear_partial_files(tmp_path)
+    assert list(tmp_path.iterdir()) == [mine]
+
+
+def test_arrays_that_were_changed_or_are_of_another_schema_are_refused(tmp_path: Path) -> None:
+    path = storage.write_arrays(tmp_path / "x.npz", {"a": np.eye(3)}, schema=3)
+    assert np.array_equal(storage.read_arrays(path, "again", schema=3)["a"], np.eye(3))
+    with pytest.raises(FileProblem, match="schema 3, not 4; again"):
+        storage.read_arrays(path, "again", schema=4)
+    with np.load(path) as file:
+        arrays = {name: file[name] for name in file.files}
+    for change in (
+        {"a": np.eye(3) + 1e-16},
+        {"a": np.eye(3).astype(np.float32)},
+        {"a": np.eye(3).reshape(9)},
+        {"b": np.eye(3)},
+    ):
+        np.savez(path, **(arrays | change))
+        with pytest.raises(FileProblem, match="changed after it was written"):
+            storage.read_arrays(path, "again", schema=3)
+    np.savez(path, a=np.eye(3), schema=np.array(3))
+    with pytest.raises(FileProblem, match="it has no 'sha256'"):
+        storage.read_arrays(path, "again", schema=3)
+
+
+def test_stored_arrays_say_what_is_wrong_with_them() -> None:
+    arrays = storage.StoredArrays(
+        {"a": np.zeros((2, 3)), "b": np.array([np.inf]), "c": np.array("{}"), "d": np.array(["x"])},
+        "x.npz",
+        "again",
+        "library",
+    )
+    assert arrays.numbers("a", 2, None).shape == (2, 3)
+    assert arrays.document("c") == {}
+    assert arrays.texts("d") == ["x"]
+    for ask, problem in [
+        (lambda: arrays.numbers("z"), "it has no 'z'"),
+        (lambda: arrays.numbers("a", 3, None), r"a has the shape \(2, 3\), not \(3, n\)"),
+        (lambda: arrays.numbers("a", 2), r"a has the shape \(2, 3\), not \(2\)"),
+        (lambda: arrays.numbers("b", None), "b is not finite"),
+        (lambda: arrays.numbers("c"), "c is .*, not numbers"),
+        (lambda: arrays.text("d"), "d has the shape"),
+        (lambda: arrays.texts("c"), "c has the shape"),
+        (lambda: arrays.document("a"), "a is float64, not text"),
+    ]:
+        with pytest.raises(FileProblem, match=f"x.npz: damaged library \\({problem}.*; again"):
+            ask()
+
+
+@dataclass(frozen=True)
+class _Box:
+    things: tuple[_Thing, ...]
+    best: _Thing | None = None
+    size: float = 1.0
+
+
+def test_text_that_we_wrote_has_every_field_at_every_depth_or_is_refused() -> None:
+    thing = {"name": "a", "values": [1.0]}
+
+    def read(document: object) -> _Box:
+        return storage.from_text(json.dumps(document), _Box, "a box", "pack it again")
+
+    whole = {"things": [thing], "best": thing, "size": 2.0}
+    assert read(whole) == _Box((_Thing("a", (1.0,)),), _Thing("a", (1.0,)), 2.0)
+    for document, fault in [
+        ({**whole, "things": [{**thing, "more": 1}]}, "unknown field more"),
+        ({**whole, "best": {**thing, "more": 1}}, "unknown field more"),
+        ({"things": [], "size": 1.0}, "missing field best"),
+        ({**whole, "size": "large"}, "Expected `float`"),
+        ("[" * 9, "Expected `object`"),
+    ]:
+        with pytest.raises(InvalidInput, match=f"this is not a box .*{fault}.*; pack it again"):
+            read(document)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<a>" * 300 + "</a>" * 300,
+        '<!DOCTYPE a [<!ENTITY x "y">]><a>&x;</a>',
+        "<a>",
+        "",
+        "<a b=1/>",
+        "\ud800",
+    ],
+)
+def test_xml_that_is_none_or_bottomless_is_damage(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "x.xml"
+    path.write_bytes(text.encode(errors="surrogatepass"))
+    with pytest.raises(FileProblem, match="damaged robot"):
+        storage.read_xml(path, "again", what="robot")
+
+
+def test_xml_of_100_mb_is_not_read(tmp_path: Path) -> None:
+    with (tmp_path / "x.xml").open("wb") as stream:
+        stream.truncate(100_000_000)
+    with pytest.raises(FileProblem, match=r"is too large \(100 MB\)"):
+        storage.read_xml(tmp_path / "x.xml", "again")
+
+
+def test_a_temporary_folder_is_gone_at_the_end_and_its_absence_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with storage.temporary_folder() as folder:
+        (folder / "x").write_text("")
+    assert not list(tmp_path.iterdir())
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    with (
+        pytest.raises(FileProblem, match=r"none: cannot be written .*; .*set TMPDIR"),
+        storage.temporary_folder(),
+    ):
+        pass

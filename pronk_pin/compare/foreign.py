@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from .._checks import path as known_path
-from .._mjcf import check_mjcf, loading, read_mjcf
+from .._mjcf import check_mjcf, compile_mjcf, loading, read_mjcf
 from .._state import as_robot
 from ..errors import InvalidInput
 from ..parity import SIX_DIGITS, Parity, compare_models
@@ -57,12 +57,9 @@ def mjcf_spec(robot: Robot, path: Path | str, *, actuators: bool = False) -> muj
     trunk.pos, trunk.quat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
     for joint in trunk.joints:  # which may have inherited friction that was meant for the legs
         joint.armature, joint.frictionloss, joint.damping = 0.0, 0.0, np.zeros(len(joint.damping))
-    with loading(path):
-        compiled = spec.compile()
-    _write_inertias(spec, compiled)
+    _write_inertias(spec, compile_mjcf(spec, path))
     _drop_shapes(spec)
-    with loading(path):
-        spec.compile()
+    compile_mjcf(spec, path)
     return spec
 
 

@@ -13,13 +13,13 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import mujoco
 import numpy as np
 
 from .._checks import NOT_NEGATIVE, instance_of, real, whole
-from .._mjcf import loading, read_mjcf
+from .._mjcf import compile_mjcf, read_mjcf
 from .._typing import Array
 from .._urdf_file import read_urdf
 from ..errors import FileProblem, InvalidInput
@@ -202,8 +202,11 @@ def _written(value: Any) -> Any:
     return value
 
 
+_Number: TypeAlias = float | Literal["inf", "-inf"] | None
+"""A number as JSON has it: infinity is a word, and NaN is null."""
+
 _Word: TypeAlias = float | str | None
-"""A value as JSON has it; infinity is a word."""
+"""A value as JSON has it."""
 
 
 @dataclass(frozen=True)
@@ -212,9 +215,9 @@ class _StoredRow:
 
     what: str
     where: str
-    a: _Word | tuple[_Word, ...]
-    b: _Word | tuple[_Word, ...]
-    difference: _Word
+    a: _Word | tuple[_Number, ...]
+    b: _Word | tuple[_Number, ...]
+    difference: _Number
     unit: str
     agrees: bool | None
 
@@ -228,9 +231,9 @@ class _Stored:
     rows: tuple[_StoredRow, ...]
     states: int
     tolerance: float
-    mass_matrix: _Word
-    bias: _Word
-    jacobian: _Word
+    mass_matrix: _Number
+    bias: _Number
+    jacobian: _Number
     reason: str
 
 
@@ -241,7 +244,9 @@ def _restored(row: _StoredRow) -> Row:
         return float(value) if value in ("inf", "-inf") else value
 
     values: dict[str, Any] = {
-        key: tuple(map(number, value)) if isinstance(value, tuple) else number(value)
+        key: tuple(math.nan if part is None else number(part) for part in value)
+        if isinstance(value, tuple)
+        else number(value)
         for key, value in vars(row).items()
     }
     missing = values["difference"] is None
@@ -334,8 +339,7 @@ def _read_file(path: Path) -> Mechanism:
         )
     spec = read_mjcf(path)
     six_digits = _has_six_digits(spec)
-    with loading(path, "correct what it names"):
-        compiled = spec.compile()
+    compiled = compile_mjcf(spec, path, "correct what it names")
     return read_mujoco(compiled, f"{path} (MuJoCo)", round_off=SIX_DIGITS if six_digits else 0.0)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -80,6 +81,22 @@ def test_a_path_that_cannot_be_written_is_named(scene: Scene, tmp_path: Path) ->
     (tmp_path / "file").write_text("")
     with pytest.raises(FileProblem, match=r"cannot be written .*; choose another path"):
         write_replay(scene, tmp_path / "file" / "hop.html", fps=5.0)
+
+
+def test_a_full_disk_leaves_the_replay_that_was_there(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "hop.html"
+    path.write_text("before")
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(FileProblem, match=r"No space left on device.*choose another path"):
+        write_replay(scene, path, fps=5.0)
+    assert path.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_a_film_needs_frames(scene: Scene, tmp_path: Path) -> None:
