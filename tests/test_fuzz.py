@@ -575,10 +575,6 @@ ANALYZE = "ilc analyze ilc-stance --result {results} --strides 1 --figure {out}/
 UNREAD = {"report.md", "report.html", "replay.html"}
 """Files of a results folder that nothing reads."""
 
-unsealed = pytest.mark.xfail(
-    reason="compare/results.py does not read by pronk_pin.storage yet", strict=False
-)
-
 
 @pytest.fixture(scope="module")
 def result(
@@ -634,7 +630,6 @@ def read_result(folder: Path) -> object:
     return found
 
 
-@unsealed
 @pytest.mark.parametrize(
     "count", [40, pytest.param(400, marks=pytest.mark.slow)], ids=["short", "long"]
 )
@@ -658,7 +653,6 @@ def test_a_results_folder_with_a_damaged_file_is_refused_or_what_it_was(
     assert not found, "\n".join(found)
 
 
-@unsealed
 @pytest.mark.parametrize("command", RESULTS_COMMANDS, ids=lambda words: words.split("{whole}")[0])
 @pytest.mark.parametrize(
     "count", [1, pytest.param(6, marks=pytest.mark.slow)], ids=["short", "long"]
