@@ -27,9 +27,9 @@ from pronk_pin.compare import (
     SensorSuite,
     Simulation,
     World,
-    demand,
     explain,
     load_scenario,
+    memory,
     random_scenarios,
     run_experiment,
 )
@@ -626,15 +626,15 @@ def test_what_does_not_fit_into_memory_is_refused_with_the_estimate_and_the_reme
     gaits = list(load_library("a1").gaits[:14])
     schedule = Schedule(practice=100.0, learning=100.0)
     simulation = simulated(gaits=gaits, schedule=replace(schedule))
-    log, estimate = simulation.strides, demand.log_size(gaits, schedule.duration)
+    log, estimate = simulation.strides, memory.log_size(gaits, schedule.duration)
     arrays = [*log.scalars.values(), *log.curves.values(), log.base, log.attitude]
     arrays += [log.peak_error, log.rms_error, log.contact_error]
     assert estimate == pytest.approx(sum(array.nbytes for array in arrays), rel=0.02)
-    monkeypatch.setattr(demand, "memory", lambda: 4.0 * estimate)
-    demand.check_memory(gaits, schedule.duration)
+    monkeypatch.setattr(memory, "memory", lambda: 4.0 * estimate)
+    memory.check_memory(gaits, schedule.duration)
     with pytest.raises(PronkError, match=r"in each of 2 workers take about .*, or lower --workers"):
-        demand.check_memory(gaits, schedule.duration, at_once=2)
-    monkeypatch.setattr(demand, "memory", lambda: 2.0 * estimate)
+        memory.check_memory(gaits, schedule.duration, at_once=2)
+    monkeypatch.setattr(memory, "memory", lambda: 2.0 * estimate)
     with pytest.raises(PronkError, match=r"take about .* GB, and this machine has .*; shorten --"):
         simulated(gaits=gaits, schedule=schedule)
 

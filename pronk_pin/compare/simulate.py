@@ -19,7 +19,7 @@ from ..control.feedforward import known_gaits
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..robot import Robot
-from .demand import check_memory
+from .memory import check_memory
 from .play import Player
 from .record import StrideLog
 from .scenario import Scenario
