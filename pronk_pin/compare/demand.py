@@ -7,7 +7,7 @@ from typing import Literal
 from ..errors import InvalidInput
 from ..gait import load_library
 from .experiment import Experiment
-from .memory import SHORTER, check_memory
+from .memory import SHORTER, check_memory, number_of_robots
 
 LONGEST = 30.0
 """Days that an experiment may take, by a hopeful estimate."""
@@ -37,11 +37,7 @@ def check_demand(experiment: Experiment, workers: int) -> None:
     days = duration * len(gaits) * cells / _QUICK / workers / _DAY
     if days > LONGEST:
         raise InvalidInput(
-            f"{cells} simulations of {_robots(gaits)} over {duration:g} s take about {days:.3g} "
+            f"{cells} simulations of {number_of_robots(gaits)} over {duration:g} s take about {days:.3g} "
             f"days on {workers} cores, beyond {LONGEST:g} days; {SHORTER}, --controllers, "
             "--scenarios or --seeds"
         )
-
-
-def _robots(gaits: Sequence[Gait]) -> str:
-    return "one robot" if len(gaits) == 1 else f"{len(gaits)} robots"

@@ -55,6 +55,11 @@ def check_memory(gaits: Sequence[Gait], duration: float, *, at_once: int = 1) ->
         beside = f" in each of {at_once} workers" if at_once > 1 else ""
         fewer = ", or lower --workers" if at_once > 1 else ""
         raise InvalidInput(
-            f"the strides of {_robots(gaits)} over {duration:g} s{beside} take about "
+            f"the strides of {number_of_robots(gaits)} over {duration:g} s{beside} take about "
             f"{needed / 1e9:.3g} GB, and this machine has {there / 1e9:.3g} GB; {SHORTER}{fewer}"
         )
+
+
+def number_of_robots(gaits: Sequence[Gait]) -> str:
+    """How many robots there are, in words."""
+    return "one robot" if len(gaits) == 1 else f"{len(gaits)} robots"
