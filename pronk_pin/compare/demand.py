@@ -37,7 +37,7 @@ def check_demand(experiment: Experiment, workers: int) -> None:
     days = duration * len(gaits) * cells / _QUICK / workers / _DAY
     if days > LONGEST:
         raise InvalidInput(
-            f"{cells} simulations of {number_of_robots(gaits)} over {duration:g} s take about {days:.3g} "
-            f"days on {workers} cores, beyond {LONGEST:g} days; {SHORTER}, --controllers, "
+            f"{cells} simulations of {number_of_robots(gaits)} over {duration:g} s take about "
+            f"{days:.3g} days on {workers} cores, beyond {LONGEST:g} days; {SHORTER}, --controllers, "
             "--scenarios or --seeds"
         )
