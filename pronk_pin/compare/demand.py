@@ -38,6 +38,6 @@ def check_demand(experiment: Experiment, workers: int) -> None:
     if days > LONGEST:
         raise InvalidInput(
             f"{cells} simulations of {number_of_robots(gaits)} over {duration:g} s take about "
-            f"{days:.3g} days on {workers} cores, beyond {LONGEST:g} days; {SHORTER}, --controllers, "
-            "--scenarios or --seeds"
+            f"{days:.3g} days on {workers} cores, beyond {LONGEST:g} days; {SHORTER}, "
+            "--controllers, --scenarios or --seeds"
         )
