@@ -14,7 +14,7 @@ import numpy as np
 
 from ._urdf_file import LARGEST_QUANTITY
 from .errors import FileProblem
-from .storage import LARGEST_FILE, check_file, damaged, read_xml
+from .storage import LARGEST_FILE, check_file, damaged, read_xml, refuse_nan
 
 _GIVE = "give the path of an MJCF, with the files it names beside it where its meshdir says"
 
@@ -113,8 +113,8 @@ def check_mjcf(path: Path) -> None:
         elements += _size(place, tree)
         if elements > _MOST_ELEMENTS:
             raise damaged(path, "it makes a model of too many elements", _GIVE, what="MJCF")
+        refuse_nan(tree, place, _GIVE, what="MJCF")  # of which MuJoCo warns, and goes on
         for element in tree.iter():
-            _refuse_nan(place, element)
             if element.tag == "compiler":
                 keys = ("meshdir", "texturedir", "assetdir")
                 folders |= {path.parent / element.get(key, "") for key in keys}
@@ -138,13 +138,6 @@ def check_mjcf(path: Path) -> None:
         for folder in folders:
             if _exists(folder / name):
                 check_file(folder / name, _GIVE, limit=LARGEST_FILE)
-
-
-def _refuse_nan(path: Path, element: ElementTree.Element) -> None:
-    """MuJoCo warns of them on stderr, and goes on."""
-    for key, text in element.items():
-        if key not in ("name", "class") and "nan" in text.lower().split():
-            raise damaged(path, f'<{element.tag} {key}="{text}">', _GIVE, what="MJCF")
 
 
 def _exists(path: Path) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from .errors import FileProblem
-from .storage import LARGEST_DOCUMENT, damaged, parse_xml, read_bytes
+from .storage import LARGEST_DOCUMENT, damaged, parse_xml, read_bytes, refuse_nan
 
 _CHECK = "check the file"
 
@@ -45,12 +44,15 @@ def read_urdf(path: Path) -> Urdf:
     """
     data = read_bytes(path, _CHECK, limit=LARGEST_DOCUMENT)
     root = parse_xml(data, path, _CHECK, what="URDF")
+    refuse_nan(root, path, _CHECK, what="URDF")  # a mass of NaN is taken for none
     said: list[str] = []
     try:
         # What Pinocchio calls reads UTF-8 only.
         text = data.decode()
         with _overheard(said):
             model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+        if said:  # it goes on without the link's inertia, say
+            raise ValueError("and leaves that out")
     except Exception as error:
         reason = " ".join([*said[:1], *str(error).split()])[:500]
         raise FileProblem(path, f"not a usable URDF ({reason})", _CHECK) from error
@@ -60,21 +62,24 @@ def read_urdf(path: Path) -> Urdf:
 
 @contextlib.contextmanager
 def _overheard(said: list[str]) -> Iterator[None]:
-    """Keep what a library in C++ writes to stderr, a line each: it is part of our error's one."""
-    sys.stderr.flush()
-    stderr = os.dup(2)
-    try:
-        with tempfile.TemporaryFile() as kept:
-            os.dup2(kept.fileno(), 2)
-            try:
-                yield
-            finally:
-                os.dup2(stderr, 2)
-                kept.seek(0)
-                lines = kept.read().decode(errors="replace").splitlines()
-                said += [" ".join(line.removeprefix("Error:").split()) for line in lines]
-    finally:
-        os.close(stderr)
+    """Keep what a library in C++ calls errors on stderr: they are part of our error's one line."""
+    with contextlib.ExitStack() as stack:
+        try:
+            kept = stack.enter_context(tempfile.TemporaryFile())
+            stderr = os.dup(2)
+        except OSError:  # no room, or no stderr: it is not worth an error
+            yield
+            return
+        stack.callback(os.close, stderr)
+        os.dup2(kept.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            kept.seek(0)
+            lines = kept.read().decode(errors="replace").splitlines()
+            errors = [line.removeprefix("Error:") for line in lines if line.startswith("Error:")]
+            said += [" ".join(line.split()) for line in errors]
 
 
 def _check_numbers(path: Path, model: pin.Model) -> None:

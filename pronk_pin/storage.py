@@ -315,6 +315,18 @@ def parse_xml(data: bytes, path: Path | str, remedy: str, *, what: str = "") -> 
         return root
 
 
+def refuse_nan(root: ElementTree.Element, path: Path, remedy: str, *, what: str = "") -> None:
+    """Refuse a description of a robot in which a number is none.
+
+    Raises:
+        FileProblem: An attribute that is no name has NaN in it.
+    """
+    for element in root.iter():
+        for key, text in element.items():
+            if key not in ("name", "class", "link") and "nan" in text.lower().split():
+                raise damaged(path, f'<{element.tag} {key}="{text}">', remedy, what=what)
+
+
 class _Builder(ElementTree.TreeBuilder):
     """Builds trees that are not too deep."""
 

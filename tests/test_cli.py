@@ -203,7 +203,7 @@ def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixt
             "schedule: learning=-1.0; give a number from 0 to 86400 s",
         ),
         (["report", "nowhere"], "not a results folder (no config.json); run 'pronk-pin compare'"),
-        (["view", "nowhere.npz"], "no such gait library; make it again with 'pronk-pin gaits"),
+        (["view", "nowhere.npz"], "missing; make it again with 'pronk-pin gaits"),
         (["view", "--speed", "2"], "outside the gait library"),
         (["view", "--robot", "spot"], "unknown robot 'spot'"),
         (["gaits", "show", "0.9"], "outside the gait library"),

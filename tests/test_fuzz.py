@@ -300,6 +300,10 @@ def read_urdf(path: Path) -> object:
     robot = _load.__wrapped__(RobotSpec("fuzz", str(path)))
     model = mujoco_spec(robot).compile()
     assert np.all(np.isfinite(robot.standing))
+    links = ElementTree.fromstring(robot.urdf).findall("link")
+    masses = [link.find("inertial/mass") for link in links]
+    total = sum(float(mass.get("value", "")) for mass in masses if mass is not None)
+    assert abs(robot.mass - total) < 1e-9 * total, "a link is left out"
     assert np.all(np.isfinite(model.body_inertia))
     return robot.sha256
 

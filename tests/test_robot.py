@@ -75,6 +75,38 @@ def test_a_urdf_of_ones_own_is_read_from_its_path(robot: Robot) -> None:
     np.testing.assert_array_equal(own.standing, robot.standing)
 
 
+def test_what_pinocchio_says_of_a_urdf_is_part_of_the_one_line(
+    robot: Robot, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "weightless.urdf"
+    text = robot.urdf_path.read_text()
+    path.write_text(text.replace('<mass value="6.0"/>', "", 1))
+    assert path.read_text() != text
+    with pytest.raises(FileProblem, match=r"not a usable URDF \(Inertial element must have a mass"):
+        load_robot(RobotSpec("weightless", str(path)))
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("mass", ["nan", "-1", "1e308"])
+def test_a_mass_that_no_link_can_have_is_refused(robot: Robot, tmp_path: Path, mass: str) -> None:
+    path = tmp_path / "wrong.urdf"
+    path.write_text(robot.urdf_path.read_text().replace('"6.0"', f'"{mass}"', 1))
+    with pytest.raises(
+        FileProblem, match=r'damaged URDF \((mass, inertia or place|<mass value="nan")'
+    ):
+        load_robot(RobotSpec("wrong", str(path)))
+
+
+def test_a_robot_is_the_urdf_that_was_read_whatever_becomes_of_the_file(
+    robot: Robot, tmp_path: Path
+) -> None:
+    path = tmp_path / "own.urdf"
+    path.write_bytes(robot.urdf)
+    own = load_robot(RobotSpec("own", str(path)))
+    path.write_text("")
+    assert own.sha256 == robot.sha256
+
+
 def test_a_damaged_urdf_is_named(tmp_path: Path) -> None:
     path = tmp_path / "broken.urdf"
     path.write_text("<robot name='half'><link")
