@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pronk_pin import Robot, dynamics, energetics, kinematics, load_robot
+from pronk_pin import Robot, dynamics, kinematics, load_robot
+from pronk_pin.dynamics import energetics
 from pronk_pin.gait import load_library
 from pronk_pin.inverse_dynamics import SAGITTAL_GUIDE, inverse_dynamics
 

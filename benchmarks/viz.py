@@ -25,7 +25,7 @@ from pronk_pin.errors import NoBrowser
 from pronk_pin.gait import load_library
 from pronk_pin.robot import Robot
 from pronk_pin.viz import LiveServer, Scene, gait_scene, write_replay
-from pronk_pin.viz.browser import Browser
+from pronk_pin.viz.player import Browser
 
 SECONDS = 3.0
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 from .errors import PronkError
 
 if TYPE_CHECKING:
-    from .parameters import ModelParameters
-    from .robot import Robot, RobotSpec, load_robot
+    from .robot import ModelParameters, Robot, RobotSpec, load_robot
 
 __all__ = ["ModelParameters", "PronkError", "Robot", "RobotSpec", "load_robot"]
 __version__ = "0.1.0"

@@ -2,7 +2,7 @@
 
 Each check returns the value in the form that the package counts on (a `float` for `np.float64(3)`,
 a tuple for a list) or raises `InvalidInput`, which tells the parameter, the value and what was
-wanted. States and arrays are checked in `pronk_pin._state`.
+wanted. States and arrays are checked in `pronk_pin.robot.state`.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ import pytest
 
 from pronk_pin import Robot, RobotSpec, load_robot
 from pronk_pin._typing import Array
-from pronk_pin._urdf import mujoco_spec
 from pronk_pin.robot import ROBOTS
+from pronk_pin.robot.formats.urdf import mujoco_spec
 
 
 class States(NamedTuple):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pronk_pin import ModelParameters, PronkError, RobotSpec, conventions, energetics, load_robot
+from pronk_pin import ModelParameters, PronkError, RobotSpec, load_robot
 from pronk_pin import dynamics as dyn
 from pronk_pin import kinematics as kin
 from pronk_pin.cli import main
@@ -29,14 +29,14 @@ from pronk_pin.compare import (
     World,
     explain,
     load_scenario,
-    memory,
     random_scenarios,
     run_experiment,
 )
-from pronk_pin.compare.gains import sweep_gains
-from pronk_pin.compare.prediction import practise
-from pronk_pin.compare.seeding import measure_seeding
-from pronk_pin.compare.transfer import measure_transfers
+from pronk_pin.compare.simulation import memory
+from pronk_pin.compare.studies.gain_reduction import sweep_gains
+from pronk_pin.compare.studies.prediction import practise
+from pronk_pin.compare.studies.seeding import measure_seeding
+from pronk_pin.compare.studies.transfer import measure_transfers
 from pronk_pin.control import (
     AttitudeFilter,
     AttitudeRegulator,
@@ -61,6 +61,7 @@ from pronk_pin.control import (
     model_feedforward,
     phase_grid,
 )
+from pronk_pin.dynamics import energetics
 from pronk_pin.gait import (
     ContactPhase,
     Gait,
@@ -73,7 +74,7 @@ from pronk_pin.gait import (
 )
 from pronk_pin.inverse_dynamics import feedforward, inverse_dynamics
 from pronk_pin.parity import compare_models
-from pronk_pin.robot import Robot
+from pronk_pin.robot import Robot, conventions
 from pronk_pin.viz import Film, Scene, Track, gait_scene, library_programme
 
 any_value: Any = None  # what no type checker may look at

@@ -24,18 +24,18 @@ import numpy as np
 import pytest
 
 from pronk_pin import Robot, RobotSpec, load_robot
-from pronk_pin._urdf import mujoco_spec
 from pronk_pin.cli import main
 from pronk_pin.compare import Experiment, Results, Schedule, load_scenario, run_experiment
-from pronk_pin.compare.foreign import ForeignRobot, mjcf_sha256, mjcf_spec
-from pronk_pin.compare.scenario import Scenario
+from pronk_pin.compare.world.mjcf import ForeignRobot, mjcf_sha256, mjcf_spec
+from pronk_pin.compare.world.scenario import Scenario
 from pronk_pin.control import TorqueLibrary
 from pronk_pin.errors import FileProblem, PronkError
 from pronk_pin.gait import GaitLibrary, build_library
 from pronk_pin.gait.build import _read, _Task
 from pronk_pin.gait.style import gait_problem
 from pronk_pin.parity import compare_models
-from pronk_pin.robot import _load
+from pronk_pin.robot.formats.urdf import mujoco_spec
+from pronk_pin.robot.robot import _load
 from pronk_pin.storage import read_text, write_arrays
 
 PATIENCE = 10.0

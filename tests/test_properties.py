@@ -11,10 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pronk_pin import conventions, dynamics, energetics, inverse_dynamics, kinematics, load_robot
+from pronk_pin import dynamics, inverse_dynamics, kinematics, load_robot
 from pronk_pin._typing import Array
+from pronk_pin.dynamics import energetics
 from pronk_pin.errors import InvalidInput, PronkError
-from pronk_pin.robot import ROBOTS
+from pronk_pin.robot import ROBOTS, conventions
 
 SOME = settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 

@@ -22,7 +22,7 @@ from tyro.conf import OmitSubcommandPrefixes, subcommand
 
 from .._checks import known_name
 from ..compare import Results
-from ..compare.suites import SUITES, load_suite
+from ..compare.experiment import SUITES, load_suite
 from ..errors import LeakyFilter, OtherMachine, PronkError
 from .comparison import Compare, Explain, Report, Reproduce
 from .gaits import Gaits

@@ -20,23 +20,17 @@ from ..compare import (
     mjcf_parity,
     run_experiment,
 )
-from ..compare.changes import format_changes
-from ..compare.closing import close_loop, format_loop
-from ..compare.demand import check_demand
-from ..compare.executors import known_address
-from ..compare.explanation.explain import DRAWS, IMU_NOISE, check_learner
-from ..compare.reproduce import format_reproduction
-from ..compare.suites import load_suite
-from ..compare.words import families, format_suite, format_tables
+from ..compare.experiment import check_demand, known_address, load_suite
+from ..compare.identification import DRAWS, IMU_NOISE, check_learner
+from ..compare.report import families, format_changes, format_suite, format_tables
+from ..compare.studies import close_loop, format_loop, format_reproduction
 from ..errors import InvalidInput
-from ..model_files import write_mjcf, write_urdf
 from ..robot import load_robot
-from ..viz import write_replay
-from ..viz.explanation_figure import write_explanation_figure
-from ..viz.gait_scenes import nearest
-from ..viz.practice import practice_programme
+from ..robot.formats import write_mjcf, write_urdf
+from ..viz import known_format, write_replay
+from ..viz.figures import write_explanation_figure
 from ..viz.report import write_figures, write_report
-from ..viz.style import known_format
+from ..viz.scenes import nearest, practice_programme
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ..gait import (
     number_range,
 )
 from ..robot import load_robot
-from ..viz.gait_figures import write_gait_figures
+from ..viz.figures import write_gait_figures
 
 
 @dataclass(frozen=True)

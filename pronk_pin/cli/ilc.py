@@ -9,22 +9,23 @@ from typing import Annotated
 from tyro.conf import Positional, subcommand
 
 from .._checks import whole
-from ..compare import Results
-from ..compare.gains import describe_gains, sweep_gains
-from ..compare.prediction import (
+from ..compare import Results, load_scenario
+from ..compare.studies import (
     STRIDES,
     compare_prediction,
+    describe_gains,
     describe_prediction,
+    describe_seeding,
+    describe_transfers,
+    measure_seeding,
+    measure_transfers,
     practise,
     stored_practice,
+    sweep_gains,
 )
-from ..compare.scenario import load_scenario
-from ..compare.seeding import describe_seeding, measure_seeding
-from ..compare.transfer import describe_transfers, measure_transfers
 from ..control import load_controller
-from ..viz.learning_figures import errors_by_seed, predicted_and_measured
-from ..viz.skill_figures import gains_figure, transfers_figure
-from ..viz.style import known_format, save_figure
+from ..viz import known_format, save_figure
+from ..viz.figures import errors_by_seed, gains_figure, predicted_and_measured, transfers_figure
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import numpy as np
 from tyro.conf import Positional
 
 from .._checks import seed
-from .._urdf import mujoco_spec
 from ..parity import compare_models
 from ..robot import load_robot
+from ..robot.formats import mujoco_spec
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from .._checks import NOT_NEGATIVE, none_or, real, whole
 from ..compare import Results
 from ..errors import FileProblem, InvalidInput
 from ..viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
-from ..viz.live import DURATION, known_port
-from ..viz.practice import practice_programme
+from ..viz.player import DURATION, known_port
+from ..viz.scenes import practice_programme
 from .gaits import open_library
 
 

@@ -1,17 +1,37 @@
-"""Comparison of controllers: worlds, simulations, experiments, metrics, results."""
+"""Comparison of controllers: worlds, simulations, experiments, metrics, results.
 
-from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
-from .explanation import Explanation, describe, explain
-from .foreign import ForeignRobot, mjcf_parity, mjcf_spec
+Comes in: an `Experiment`: robot, speeds, controllers, scenarios, seeds.
+Goes out: `Results`: a folder of strides, a summary, tables, and what was learned.
+"""
+
+from .experiment import (
+    DEFAULT_CONTROLLERS,
+    Cell,
+    Experiment,
+    Results,
+    default_folder,
+    run_cell,
+    run_experiment,
+)
+from .identification import Explanation, describe, explain
 from .metrics import reduction, steady, summarize
-from .mismatch import KNOWN, MISMATCHES, Mismatch
-from .results import Results, default_folder
-from .run import run_experiment
-from .scenario import SCENARIOS, Scenario, load_scenario, random_scenarios
-from .schedule import Schedule
-from .sensors import Sensors, SensorSuite
-from .simulate import Simulation
-from .world import World, build_model
+from .simulation import Schedule, Simulation
+from .world import (
+    KNOWN,
+    MISMATCHES,
+    SCENARIOS,
+    ForeignRobot,
+    Mismatch,
+    Scenario,
+    Sensors,
+    SensorSuite,
+    World,
+    build_model,
+    load_scenario,
+    mjcf_parity,
+    mjcf_spec,
+    random_scenarios,
+)
 
 __all__ = [
     "DEFAULT_CONTROLLERS",

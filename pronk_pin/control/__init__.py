@@ -1,33 +1,58 @@
-"""Control: feedback, feedforward and iterative learning, one tape of commands a phase."""
+"""Control: feedback, feedforward and iterative learning, one tape of commands a phase.
 
-from ..base import BASES
-from .attitude import AttitudeRegulator, attitude_angle, attitude_error, roll_pitch_yaw
-from .balance import Balance, BalanceSpec
-from .contacts import ContactDetector, StanceContact, TouchdownDetector
+Comes in: gaits, a `ControllerSpec`, what was measured (`PhaseLog`, `StrideRecord`).
+Goes out: a `Tape` for each phase, and torque at each tick where the base is free.
+"""
+
+from ..robot import BASES
 from .controller import Controller
 from .controller_spec import CONTROLLERS, ControllerSpec, load_controller
-from .estimation import AttitudeEstimator, AttitudeFilter, TrunkKnown
+from .feedback import (
+    AttitudeEstimator,
+    AttitudeFilter,
+    AttitudeRegulator,
+    Balance,
+    BalanceSpec,
+    FootPlacement,
+    LegAngleRegulator,
+    TrunkKnown,
+    attitude_angle,
+    attitude_error,
+    roll_pitch_yaw,
+)
 from .feedforward import model_feedforward
-from .filters import ZeroPhaseFilter
-from .guided_strides import GuidedStrides, Settings
 from .learning import (
     SKIPPED,
     CurrentIterationILC,
     LearningLaw,
+    LiftedModel,
+    ModelBasedILC,
+    NormOptimalILC,
     PaperILC,
     PDTypeILC,
+    PlantInversionILC,
+    Skill,
     StrideSelection,
+    TorqueLibrary,
     anti_windup,
 )
-from .lifted import LiftedModel
-from .linearise import lifted_model
-from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
-from .placement import FootPlacement
-from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, phase_grid, resample
-from .reference import FlightTiming
-from .regulation import LegAngleRegulator
-from .tape import Gains, Tape, clip_torque
-from .torque_library import Skill, TorqueLibrary
+from .prediction import GuidedStrides, Settings, lifted_model
+from .signals import (
+    PARTS,
+    SAMPLES,
+    ContactDetector,
+    FlightTiming,
+    Gains,
+    PhaseLog,
+    StanceContact,
+    StrideRecord,
+    Tape,
+    TouchdownDetector,
+    ZeroPhaseFilter,
+    clip_torque,
+    phase_grid,
+    resample,
+)
 
 __all__ = [
     "BASES",

@@ -11,26 +11,27 @@ from collections.abc import Sequence
 import numpy as np
 
 from .._checks import Interval, instance_of, known_name, real
-from .._state import as_array, as_numbers
 from .._typing import Array, BoolArray, IntArray
-from ..base import BASES
 from ..errors import InvalidInput
-from ..gait import Gait
+from ..gait import Gait, known_gaits
 from ..kinematics import rotate_leg
-from ..robot import NL, Robot
-from .balance import Balance
+from ..robot import BASES, NL, Robot, as_array, as_numbers
 from .controller_spec import ControllerSpec
-from .estimation import SpeedEstimator
-from .feedforward import known_gaits
-from .filters import ZeroPhaseFilter
-from .guided_strides import Settings
-from .learning import SKIPPED, anti_windup, given, learned_by
-from .linearise import lifted_model
-from .model_based import ModelBasedILC
-from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
-from .reference import Reference
-from .symmetry import symmetric
-from .tape import Tape
+from .feedback import Balance, SpeedEstimator
+from .learning import SKIPPED, ModelBasedILC, anti_windup, given, learned_by, symmetric
+from .prediction import Settings, lifted_model
+from .signals import (
+    PARTS,
+    SAMPLES,
+    PhaseLog,
+    Reference,
+    StrideRecord,
+    Tape,
+    ZeroPhaseFilter,
+    held,
+    phase_grid,
+    resample,
+)
 
 LATEST_TOUCHDOWN = 2.0
 """Longest flight, over its planned duration, after which it ends without a touchdown."""

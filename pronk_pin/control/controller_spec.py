@@ -14,22 +14,17 @@ from .._checks import (
     known_name,
     whole,
 )
-from .balance import BalanceSpec
-from .contacts import ContactDetector
-from .estimation import SPEED_FILTER, AttitudeFilter
-from .filters import ZeroPhaseFilter
+from .feedback import SPEED_FILTER, AttitudeFilter, BalanceSpec, LegAngleRegulator
 from .learning import (
     CurrentIterationILC,
     LearningLaw,
+    NormOptimalILC,
     PaperILC,
     PDTypeILC,
     StrideSelection,
     known_law,
 )
-from .model_based import NormOptimalILC
-from .reference import FlightTiming
-from .regulation import LegAngleRegulator
-from .tape import Gains
+from .signals import ContactDetector, FlightTiming, Gains, ZeroPhaseFilter
 
 SOURCES = ("none", "model", "library", "identified")
 """Sources of a controller's initial feedforward."""

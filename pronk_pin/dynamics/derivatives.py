@@ -13,10 +13,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from .._state import as_array, as_one, as_state, leg_indices
 from .._typing import Array
-from ..kinematics.contacts import Contact, contact_radius, jacobian_at
-from ..robot import NB, Robot
+from ..kinematics import Contact, contact_radius, jacobian_at
+from ..robot import NB, Robot, as_array, as_one, as_state, leg_indices
 from .stance import NO_GAINS, contact_response, point_stance, stance_accelerations
 
 _LOCAL, _WORLD = pin.LOCAL, pin.LOCAL_WORLD_ALIGNED

@@ -10,10 +10,9 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from .._checks import SHARE, real
-from .._state import as_array, as_one, as_robot, as_state, leg_indices
 from .._typing import Array
-from ..kinematics.contacts import Contact, bias_at, contact_radius, jacobian_at
-from ..robot import NB, Robot
+from ..kinematics import Contact, bias_at, contact_radius, jacobian_at
+from ..robot import NB, Robot, as_array, as_one, as_robot, as_state, leg_indices
 from .stance import (
     NO_GAINS,
     Impact,

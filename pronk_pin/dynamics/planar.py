@@ -14,9 +14,8 @@ import numpy as np
 import pinocchio as pin
 
 from .._typing import Array, IntArray
-from ..base import Base
-from ..kinematics.contacts import Contact, contact_bias, contact_jacobian
-from ..robot import NB, Robot
+from ..kinematics import Contact, contact_bias, contact_jacobian
+from ..robot import NB, Base, Robot
 from .derivatives import partials
 
 

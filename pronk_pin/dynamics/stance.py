@@ -14,12 +14,10 @@ import numpy as np
 import pinocchio as pin
 import scipy.linalg
 
-from .._state import REFUSALS, as_array, sound_base
 from .._typing import Array, BoolArray
 from ..errors import InvalidInput
-from ..kinematics import foot_positions
-from ..kinematics.contacts import bias_at, jacobian_at
-from ..robot import NB, Robot
+from ..kinematics import bias_at, foot_positions, jacobian_at
+from ..robot import NB, REFUSALS, Robot, as_array, sound_base
 
 _SINGULAR = 1e-10
 """Relative eigenvalue of J M^-1 J^T below which a stance counts as singular."""

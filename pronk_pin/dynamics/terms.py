@@ -15,9 +15,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from .._state import REFUSALS, as_one, as_q, as_robot, as_state, sound_base
 from .._typing import Array
-from ..robot import NB, Robot
+from ..robot import NB, REFUSALS, Robot, as_one, as_q, as_robot, as_state, sound_base
 
 _COUPLING = 4
 """Flat index, in the matrices, of the base's x against its pitch: every link has a part in it."""

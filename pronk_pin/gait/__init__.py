@@ -1,13 +1,16 @@
-"""Gaits: optimal periodic motions, their Bezier form, and the gait library."""
+"""Gaits: optimal periodic motions, their Bezier form, and the gait library.
+
+Comes in: a `Robot`, a speed, an apex and a contact sequence (`GaitProblem`).
+Goes out: a `GaitSolution`, its `Audit`, and a `Gait` in a `GaitLibrary`.
+"""
 
 from .audit import BezierLoss, audit, bezier_orders
 from .build import build_library
 from .checks import Audit, Check
 from .describe import describe_gait, describe_library
-from .gait import Gait, GaitPhase, Motion
-from .guess import vertical_hop
+from .gait import Gait, GaitPhase, Motion, known_gaits
 from .library import GaitLibrary, load_library
-from .optimize import GaitSolution, SolverState, optimize_gait
+from .optimisation import GaitSolution, SolverState, optimize_gait, vertical_hop
 from .problem import BOUND, PRONK, ContactPhase, GaitProblem
 from .residual import GaitResidual, gait_residual
 from .style import SPEEDS, STYLES, Style, gait_problem, known_base, load_style, number_range
@@ -38,6 +41,7 @@ __all__ = [
     "gait_problem",
     "gait_residual",
     "known_base",
+    "known_gaits",
     "load_library",
     "load_style",
     "number_range",

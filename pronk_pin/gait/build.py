@@ -25,17 +25,14 @@ from tqdm import tqdm
 
 from .._checks import path as known_path
 from .._checks import reals, worker_count
-from .._state import as_robot
 from .._typing import Array
 from .._workers import begin_worker
-from ..base import Base
 from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
-from ..robot import Robot, RobotSpec, load_robot
+from ..robot import Base, Robot, RobotSpec, as_robot, load_robot
 from ..storage import clear_partial_files, read_arrays, temporary_folder, write_arrays
 from .audit import audit, bezier_orders
-from .ballistics import check_ballistics
 from .library import PER_GAIT, SCHEMA, GaitLibrary, from_arrays, to_arrays
-from .optimize import GaitSolution, SolverState, optimize_gait
+from .optimisation import GaitSolution, SolverState, check_ballistics, optimize_gait
 from .problem import GaitProblem
 from .style import gait_problem, load_style
 

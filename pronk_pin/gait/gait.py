@@ -14,11 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
-from .._checks import instance_of, real, text
-from .._state import as_numbers, as_robot
+from .._checks import instance_of, real, sequence_of, text
 from .._typing import Array
 from ..errors import InvalidInput
-from ..robot import NB, Robot
+from ..robot import NB, Robot, as_numbers, as_robot
 from . import bezier
 
 ARRAYS = ("joints", "base", "tau", "lam")
@@ -235,3 +234,26 @@ class Gait:
             phases.append(GaitPhase(own_phase.name, own_phase.feet, duration, **mixed))
         speed, apex = mix(self.speed, other.speed), mix(self.apex, other.apex)
         return Gait(self.robot, speed, apex, tuple(phases))
+
+
+def known_gaits(robot: Robot, gaits: Sequence[Gait]) -> tuple[Gait, ...]:
+    """Gaits of a robot, one or more.
+
+    Raises:
+        InvalidInput: There is none, or one is no gait, or of another robot.
+    """
+    as_robot(robot)
+    if isinstance(gaits, Gait):
+        raise InvalidInput("gaits is one Gait; give a list, with a gait for each robot")
+    found = sequence_of(
+        "gaits", gaits, lambda name, gait: instance_of(name, gait, Gait), wanted="gaits"
+    )
+    if not found:
+        raise InvalidInput("gaits is empty; give one for each robot")
+    for gait in found:
+        if gait.robot != robot.name:
+            raise InvalidInput(
+                f"a gait of the {gait.robot} cannot be played by the {robot.name}; take it from "
+                f"load_library('{robot.name}')"
+            )
+    return found

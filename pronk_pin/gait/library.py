@@ -15,10 +15,9 @@ import numpy as np
 from .._checks import instance_of, none_or, real, sequence_of
 from .._checks import path as known_path
 from .._typing import Array
-from ..base import Base
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange
-from ..kinematics.contacts import Contact
-from ..robot import NL, ROBOTS, Robot, load_robot
+from ..kinematics import Contact
+from ..robot import NL, ROBOTS, Base, Robot, load_robot
 from ..storage import StoredArrays, read_arrays, sha256, write_arrays
 from .checks import Audit, StoredAudit
 from .gait import ARRAYS, Gait, GaitPhase

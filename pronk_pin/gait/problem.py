@@ -9,13 +9,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from .._checks import Interval, instance_of, keep_reals, known_name, reals, sequence_of, text, whole
-from .._state import as_robot
-from ..base import Base
-from ..dynamics import Contact
+from .._checks import (
+    Interval,
+    instance_of,
+    keep_reals,
+    known_name,
+    reals,
+    sequence_of,
+    text,
+    whole,
+)
 from ..errors import InvalidInput
-from ..kinematics.contacts import CONTACTS
-from ..robot import Robot
+from ..kinematics import CONTACTS, Contact
+from ..robot import Base, Robot, as_robot
 
 Pair = Literal["front", "rear"]
 """A pair of legs, left and right: in a gait with mirror symmetry they do the same."""
@@ -38,7 +44,8 @@ _NUMBERS = {
     "trunk_height": Interval(0, 10, "m"),
     "clearance": Interval(0, 1, "m"),
 }
-"""What the numbers of a problem can be; `gait.ballistics` knows more of speed and apex."""
+"""What the numbers of a problem can be; `gait.optimisation.ballistics` knows more of speed and
+apex."""
 
 
 def _duration_range(name: str, limits: tuple[float, float]) -> tuple[float, float]:

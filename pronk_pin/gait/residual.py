@@ -8,12 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from .._checks import Interval, instance_of, known_name, whole
-from .._state import as_robot
 from .._typing import Array
-from ..base import Base
-from ..dynamics import Contact, contact_jacobian, planar_rows
-from ..kinematics import foot_positions
-from ..robot import NB, Robot
+from ..dynamics import planar_rows
+from ..kinematics import Contact, contact_jacobian, foot_positions
+from ..robot import NB, Base, Robot, as_robot
 from .gait import Gait, Motion
 
 

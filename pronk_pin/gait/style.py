@@ -9,9 +9,8 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from .._checks import known_name, sequence_of, shown, text
-from ..base import Base
 from ..errors import InvalidInput
-from ..robot import Robot
+from ..robot import Base, Robot
 from .problem import BOUND, PITCHING_PRONK, PRONK, ContactPhase, GaitProblem
 
 

@@ -16,7 +16,7 @@ from proxsuite import proxqp
 
 from .._typing import Array, IntArray
 from ..robot import NB
-from .problem import ForceProblem, SaddlePoint
+from .force_problem import ForceProblem, SaddlePoint
 
 _SIDES = 8
 _ACCURACY = 1e-9

@@ -14,13 +14,22 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from .._checks import POSITIVE, Interval, known_name, none_or, real, sequence_of, shown, text, whole
-from .._state import as_array, as_numbers, as_robot, as_state, leg_indices
+from .._checks import (
+    POSITIVE,
+    Interval,
+    known_name,
+    none_or,
+    real,
+    sequence_of,
+    shown,
+    text,
+    whole,
+)
 from .._typing import Array, BoolArray
 from ..errors import InvalidInput
-from ..kinematics.contacts import Contact, contact_radius
-from ..robot import Robot
-from .problem import ForceProblem, SaddlePoint, force_problem, saddle_point
+from ..kinematics import Contact, contact_radius
+from ..robot import Robot, as_array, as_numbers, as_robot, as_state, leg_indices
+from .force_problem import ForceProblem, SaddlePoint, force_problem, saddle_point
 from .qp import cone_sides, constrained_forces
 
 GUIDE_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -1,5 +1,18 @@
-"""Kinematics: feet from joints, joints from feet, trunk velocity from stance legs, whole body."""
+"""Kinematics: feet from joints, joints from feet, trunk velocity from stance legs, whole body.
 
+Comes in: a `Robot`, configurations and velocities, batch first.
+Goes out: positions and velocities of feet, joint angles, contact Jacobians and their biases.
+"""
+
+from .contacts import (
+    CONTACTS,
+    Contact,
+    bias_at,
+    contact_bias,
+    contact_jacobian,
+    contact_radius,
+    jacobian_at,
+)
 from .feet import (
     LegSolution,
     foot_positions,
@@ -9,16 +22,29 @@ from .feet import (
     leg_odometry,
     rotate_leg,
 )
+from .legs import LegGeometry, contact_points, leg_angles, leg_geometry, leg_motion
 from .whole_body import WholeBodySolution, inverse_kinematics
 
 __all__ = [
+    "CONTACTS",
+    "Contact",
+    "LegGeometry",
     "LegSolution",
     "WholeBodySolution",
+    "bias_at",
+    "contact_bias",
+    "contact_jacobian",
+    "contact_points",
+    "contact_radius",
     "foot_positions",
     "foot_velocities",
     "inverse_kinematics",
+    "jacobian_at",
     "leg_angle",
+    "leg_angles",
+    "leg_geometry",
     "leg_inverse_kinematics",
+    "leg_motion",
     "leg_odometry",
     "rotate_leg",
 ]

@@ -19,9 +19,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from .._checks import known_name
-from .._state import as_one, as_q, as_state, leg_indices
 from .._typing import Array
-from ..robot import Robot
+from ..robot import Robot, as_one, as_q, as_state, leg_indices
 
 Contact = Literal["point", "rolling"]
 """Contact model of a foot: "point" or "rolling"."""

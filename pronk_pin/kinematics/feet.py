@@ -10,11 +10,20 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from .._checks import known_name
-from .._state import as_array, as_numbers, as_q, as_robot, as_state, leg_indices
 from .._typing import Array, BoolArray
-from ..conventions import rotation_matrix
 from ..errors import InvalidInput
-from ..robot import JOINTS, NB, Robot
+from ..robot import (
+    JOINTS,
+    NB,
+    Robot,
+    as_array,
+    as_numbers,
+    as_q,
+    as_robot,
+    as_state,
+    leg_indices,
+    rotation_matrix,
+)
 from .legs import Hip, Knee, LegGeometry, leg_angles, leg_geometry, leg_motion
 
 _ROUND_OFF = 1e-9

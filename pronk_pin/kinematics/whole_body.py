@@ -11,9 +11,8 @@ import pinocchio as pin
 from proxsuite import proxqp
 
 from .._checks import POSITIVE, Interval, real, whole
-from .._state import as_array, as_numbers, as_one, as_q, leg_indices
 from .._typing import Array
-from ..robot import NB, Robot
+from ..robot import NB, Robot, as_array, as_numbers, as_one, as_q, leg_indices
 from .contacts import jacobian_at
 
 _DAMPING = (1e-12, 1e-8, 1e-5, 1e-3, 1e-1, 10.0)

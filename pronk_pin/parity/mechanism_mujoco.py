@@ -7,9 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from .._typing import Array
-from ..conventions import rotation_matrix
 from ..errors import InvalidInput
-from ..robot import NB
+from ..robot import NB, rotation_matrix
 from .actuators import actuator_kind, joint_actuators, through_gears, torque_limits
 from .mechanism import FLOATING, TRUNK, Dynamics, Foot, Joint, Link, Mechanism, Point, State
 

@@ -19,11 +19,10 @@ import mujoco
 import numpy as np
 
 from .._checks import NOT_NEGATIVE, instance_of, real, whole
-from .._mjcf import compile_mjcf, read_mjcf
 from .._typing import Array
-from .._urdf_file import read_urdf
 from ..errors import FileProblem, InvalidInput
-from ..robot import Robot
+from ..robot import Robot, read_urdf
+from ..robot.formats import compile_mjcf, read_mjcf
 from ..storage import from_text, read_xml
 from .mechanism import FLOATING, Mechanism, Point, State, read_pinocchio
 from .mechanism_mujoco import read_mujoco

@@ -1,12 +1,12 @@
-"""Looking: scenes, the live page, replays in one file, pictures and films."""
+"""Looking: scenes, the live page, replays in one file, pictures and films.
 
-from .gait_scenes import gait_scene, library_programme
-from .live import LiveServer, serve
-from .programme import Programme
-from .replay import write_replay
-from .scene import Mark, Scene, Track
-from .show import play, show
-from .video import Film, write_film, write_png
+Comes in: motions, gaits, `Results`.
+Goes out: a page, a replay, a film, figures, a report.
+"""
+
+from .figure_style import known_format, save_figure
+from .player import Film, LiveServer, play, serve, show, write_film, write_png, write_replay
+from .scenes import Mark, Programme, Scene, Track, gait_scene, library_programme
 
 __all__ = [
     "Film",
@@ -16,8 +16,10 @@ __all__ = [
     "Scene",
     "Track",
     "gait_scene",
+    "known_format",
     "library_programme",
     "play",
+    "save_figure",
     "serve",
     "show",
     "write_film",

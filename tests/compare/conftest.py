@@ -10,8 +10,8 @@ import pytest
 
 from pronk_pin._typing import Array
 from pronk_pin.compare import Experiment, Results, Schedule, Simulation, load_scenario
+from pronk_pin.compare.experiment.run import run_experiment
 from pronk_pin.compare.metrics import COLUMNS
-from pronk_pin.compare.run import run_experiment
 from pronk_pin.control import ControllerSpec
 from pronk_pin.gait import Gait, load_library
 from pronk_pin.robot import Robot

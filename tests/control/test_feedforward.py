@@ -5,7 +5,7 @@ import pytest
 
 from pronk_pin._typing import Array
 from pronk_pin.compare import Schedule, Simulation, load_scenario
-from pronk_pin.compare.record import StrideLog
+from pronk_pin.compare.simulation.log import StrideLog
 from pronk_pin.control import SAMPLES, load_controller
 from pronk_pin.control.feedforward import model_feedforward
 from pronk_pin.gait import Gait

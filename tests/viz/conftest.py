@@ -13,7 +13,7 @@ from PIL import Image
 from pronk_pin.errors import NoBrowser
 from pronk_pin.robot import Robot, load_robot
 from pronk_pin.viz import Mark, Scene, Track
-from pronk_pin.viz.browser import Browser
+from pronk_pin.viz.player.browser import Browser
 
 
 class Eye(Browser):

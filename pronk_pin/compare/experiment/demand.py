@@ -1,0 +1,43 @@
+"""What an experiment demands of the machine, before any of it is run."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ...errors import InvalidInput
+from ...gait import load_library
+from ..simulation import SHORTER, check_memory, number_of_robots
+from .experiment import Experiment
+
+LONGEST = 30.0
+"""Days that an experiment may take, by a hopeful estimate."""
+
+_QUICK = 25.0
+"""Robot-seconds that a core simulates in a second, at 1 kHz with a locked base: `make compare`
+takes a minute on two cores for 14 robots, 5 controllers and 40.5 s. Tick by tick it is less."""
+
+_DAY = 86_400.0
+
+
+def check_demand(experiment: Experiment, workers: int) -> None:
+    """Refuse an experiment that does not fit into memory, or takes longer than anybody waits.
+
+    Args:
+        experiment: The experiment.
+        workers: Processes that share it.
+
+    Raises:
+        InvalidInput: It does not, or does.
+    """
+    base: Literal["sagittal"] | None = None if experiment.base == "locked" else "sagittal"
+    library = load_library(experiment.robot, base=base)
+    gaits = [library.at(speed) for speed in experiment.speeds]
+    duration, cells = experiment.schedule.duration, len(experiment.cells())
+    check_memory(gaits, duration, at_once=min(workers, cells))
+    days = duration * len(gaits) * cells / _QUICK / workers / _DAY
+    if days > LONGEST:
+        raise InvalidInput(
+            f"{cells} simulations of {number_of_robots(gaits)} over {duration:g} s take about "
+            f"{days:.3g} days on {workers} cores, beyond {LONGEST:g} days; {SHORTER}, "
+            "--controllers, --scenarios or --seeds"
+        )

@@ -1,0 +1,284 @@
+"""Running an experiment: cells side by side in any executor, each saved as soon as it is done.
+
+The process that runs the experiment is the only one that writes: workers hand back the finished
+file as bytes, so that they may sit on other machines and be killed at any moment.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import xarray as xr
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
+
+from ..._checks import instance_of, path, worker_count
+from ..._workers import count_steps
+from ...control import load_controller
+from ...errors import FileProblem, WorkerLost
+from ..simulation import Progress
+from .demand import check_demand
+from .executors import Crew, connect, known_address, processes
+from .experiment import PRACTISED, Cell, Experiment, run_cell
+from .provenance import describe_run
+from .results import Results
+from .strides_file import encode
+
+LIVES = 3
+"""So often the workers may be lost before the run gives up."""
+
+_one_at_a_time = threading.Lock()
+"""Pinocchio's data belongs to the process: threads of one process take turns."""
+
+
+def run_experiment(
+    experiment: Experiment,
+    folder: Path | str,
+    *,
+    workers: int | None = None,
+    executor: Executor | str | None = None,
+    progress: bool = True,
+    resimulate: bool = False,
+) -> Results:
+    """Run what is missing of an experiment, and write its summary.
+
+    The files are the same to the bit for any executor and any number of workers, and however often
+    the run was killed and taken up again; only provenance.json tells.
+
+    Args:
+        experiment: What to run.
+        folder: The results folder. One that holds a part is completed; one with other controllers,
+            scenarios, speeds or seeds is extended, and keeps what it has.
+        workers: Processes; by default one for each core. A script that asks for more than one must
+            guard its own main code with `if __name__ == "__main__"`.
+        executor: Who runs the cells instead of these processes: any `concurrent.futures.Executor`,
+            or the address "dask://HOST:PORT" of a dask scheduler.
+        progress: Show a progress bar.
+        resimulate: Simulate again what the folder has damaged, or of something else; otherwise it
+            is refused by name.
+
+    Returns:
+        The results, of everything that the folder has.
+
+    Raises:
+        FileProblem: The folder cannot be written, holds another experiment or strides of one, was
+            begun with other versions or another MJCF, or another run is writing there; or the MJCF
+            cannot be read.
+        InvalidInput: The MJCF is not of this robot, or no worker is allowed.
+        ExecutorUnavailable: The executor at that address cannot be used.
+        WorkerLost: Workers ended in the middle of their work again and again.
+    """
+    instance_of("experiment", experiment, Experiment)
+    workers, folder = worker_count(workers), path("folder", folder)
+    if executor is None:
+        check_demand(experiment, workers)
+    elif isinstance(executor, str):
+        known_address(executor)
+    else:
+        instance_of("executor", executor, Executor, "an Executor, or an address dask://HOST:PORT")
+    fresh = not folder.exists()
+    results = Results.create(experiment, folder, resimulate=resimulate)
+    try:
+        with results.locked():
+            _complete(results, workers, executor, progress=progress, resimulate=resimulate)
+    except BaseException:
+        if fresh:
+            results.remove_if_empty()
+        raise
+    return results
+
+
+def _complete(
+    results: Results,
+    workers: int,
+    executor: Executor | str | None,
+    *,
+    progress: bool,
+    resimulate: bool,
+) -> None:
+    """Simulate what is missing, and summarize."""
+    cells = _missing(results, resimulate=resimulate)
+    if not cells and results.provenance["finished"]:
+        results.summarize()
+        return  # who made the strides stays on record
+    results.check_versions()
+    results.check_foreign()
+    with tqdm(
+        total=sum(map(_robot_steps, cells)),
+        desc=f"simulating {len(results.experiment.speeds)} robots x {len(cells)}",
+        unit=" robot-steps",
+        unit_scale=True,
+        mininterval=0.5 if sys.stderr.isatty() else 10.0,
+        disable=not progress or not cells,
+    ) as bar:
+        run = _Run(results, bar, set(cells))
+        if executor is None and (workers == 1 or len(cells) <= 1):
+            run.here(cells)
+        else:
+            run.elsewhere(cells, _crew(executor, min(workers, len(cells))))
+    began = time.monotonic()
+    results.summarize()
+    run.finish(summary=time.monotonic() - began)
+
+
+def _missing(results: Results, *, resimulate: bool) -> list[Cell]:
+    """The cells that have to be simulated."""
+    missing: list[Cell] = []
+    for cell in results.experiment.cells():
+        try:
+            there = results.has(cell)
+        except FileProblem:
+            if not resimulate:
+                raise
+            results.path(cell).unlink(missing_ok=True)
+            there = False
+        if not there:
+            missing.append(cell)
+    return missing
+
+
+def _crew(
+    executor: Executor | str | None, workers: int
+) -> Callable[[], AbstractContextManager[Crew]]:
+    """What opens the executor, anew after its workers were lost."""
+    if executor is None:
+        return lambda: processes(workers)
+    if isinstance(executor, str):
+        address = executor
+        return lambda: connect(address)
+    given = executor
+    return lambda: nullcontext(Crew(given, type(given).__name__))
+
+
+class Made(NamedTuple):
+    """A finished cell, as a worker hands it back."""
+
+    strides: bytes
+    """Its file."""
+    simulation: float
+    """How long the simulation took [s]."""
+    encoding: float
+    """How long it took to make the file of it [s]."""
+
+
+@dataclass
+class _Run:
+    """A run that is under way, and what is on record of it."""
+
+    results: Results
+    bar: tqdm[Any]
+    missing: set[Cell]
+    began: float = field(default_factory=time.monotonic)
+
+    def __post_init__(self) -> None:
+        self._record = {**describe_run(), "executor": "one process", "cells": {}}
+        self._earlier = self.results.provenance["runs"]
+        self._write()
+
+    def here(self, cells: list[Cell]) -> None:
+        """Run cells one after the other in this process."""
+        for cell in cells:
+            robots = len(cell.speeds)
+            made = _make(cell, self._practised(cell), lambda n, m=robots: self.bar.update(n * m))  # type: ignore[misc]
+            self._save(cell, made)
+
+    def elsewhere(
+        self, cells: list[Cell], open_crew: Callable[[], AbstractContextManager[Crew]]
+    ) -> None:
+        """Run cells in an executor; workers that are lost are replaced, and their cells repeated.
+
+        Raises:
+            WorkerLost: They were lost again and again.
+        """
+        for _ in range(LIVES):
+            with open_crew() as crew:
+                self._record["executor"] = crew.name
+                try:
+                    return self._play(crew, [c for c in cells if c in self.missing])
+                except crew.lost as error:
+                    reason = error
+        raise WorkerLost(self.results.folder) from reason
+
+    def _play(self, crew: Crew, waiting: list[Cell]) -> None:
+        """Hand cells out and save what comes back; one waits for what it depends on."""
+        total, left = int(self.bar.total or 0), sum(map(_robot_steps, waiting))
+        running: dict[Future[Made], Cell] = {}
+        try:
+            while waiting or running:
+                for cell in waiting.copy():
+                    if cell.practised is None or cell.practised not in self.missing:
+                        waiting.remove(cell)
+                        running[crew.executor.submit(_work, cell, self._practised(cell))] = cell
+                for future in wait(running, timeout=0.2, return_when=FIRST_COMPLETED)[0]:
+                    self._save(running[future], future.result())
+                    del running[future]
+                unfinished = [*waiting, *running.values()]
+                steps = crew.steps() if crew.steps else left - sum(map(_robot_steps, unfinished))
+                self.bar.update(total - left + steps - self.bar.n)
+        except BaseException:
+            self._give_up(running)
+            crew.stop()
+            raise
+
+    def _give_up(self, running: dict[Future[Made], Cell]) -> None:
+        """Call off what has not begun, and save what was finished meanwhile."""
+        for future in running:
+            future.cancel()
+        with suppress(FileProblem):
+            for future, cell in running.items():
+                if future.done() and not future.cancelled() and not future.exception():
+                    self._save(cell, future.result())
+
+    def _practised(self, cell: Cell) -> xr.Dataset | None:
+        if cell.practised is None:
+            return None
+        # Identification reads every tick; a library is made of a few variables.
+        explains = load_controller(cell.controller).source == "identified"
+        return self.results.strides(cell.practised, None if explains else PRACTISED)
+
+    def _save(self, cell: Cell, made: Made) -> None:
+        self.results.save(cell, made.strides)
+        self.missing.discard(cell)
+        self._record["cells"][cell.name] = {
+            "simulation_s": round(made.simulation, 2),
+            "encoding_s": round(made.encoding, 2),
+        }
+        self._write()
+
+    def finish(self, *, summary: float) -> None:
+        """The run is complete; its summary took so long [s]."""
+        self._record["wall_time_s"] = round(time.monotonic() - self.began, 1)
+        self._record["summary_s"] = round(summary, 2)
+        self._write(finished=True)
+
+    def _write(self, *, finished: bool = False) -> None:
+        runs = [*self._earlier, self._record]
+        self.results.write_provenance({"finished": finished, "runs": runs})
+
+
+def _robot_steps(cell: Cell) -> int:
+    return cell.steps * len(cell.speeds)
+
+
+def _make(cell: Cell, practised: xr.Dataset | None, progress: Progress) -> Made:
+    # BLAS with several threads may add in another order, and workers side by side need no more.
+    with _one_at_a_time, threadpool_limits(1):
+        times = [time.perf_counter()]
+        strides = run_cell(cell, practised, progress)
+        times.append(time.perf_counter())
+        data = encode(strides)
+        times.append(time.perf_counter())
+    return Made(data, times[1] - times[0], times[2] - times[1])
+
+
+def _work(cell: Cell, practised: xr.Dataset | None) -> Made:
+    """What a worker does."""
+    return _make(cell, practised, lambda steps: count_steps(steps * len(cell.speeds)))

@@ -1,0 +1,190 @@
+"""The last strides of a simulation, tick by tick, as motions in Pinocchio's layout.
+
+A state at tick j is the one before step j, and the torque at tick j acts during step j. A step is
+semi-implicit: its acceleration is the difference of the velocities around it, at the
+configuration before it, and friction acts on the velocity after it. A torque stamped a tick late,
+or a velocity half a tick, would spoil every estimate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.ndimage
+import xarray as xr
+
+from ..._typing import Array
+from ...errors import InvalidInput
+from ...robot import NB, Robot, load_robot
+from ..world import Scenario
+from .model_terms import Motion
+
+PARTS = ("stance", "flight")
+"""Phases of a stride in pronking."""
+_SHORTEST = 0.8
+"""Strides shorter than this share of the others' are left out."""
+FEWEST = 2
+"""Strides that are needed: the noise of one is told from the motion by another."""
+_SLIDING = 0.02
+"""Width of the step from -1 to 1 in the direction of motion [rad/s]."""
+
+
+@dataclass(frozen=True)
+class PhaseRecording:
+    """A phase of k strides at one speed, cut to the ticks that all of them have.
+
+    Attributes:
+        part: "stance" or "flight".
+        joints: Joint angles [rad], shape (k, ticks + 1, 12).
+        rates: Joint velocities [rad/s], shape (k, ticks + 1, 12).
+        torque: Torques that the motors were told [N m], shape (k, ticks + 1, 12).
+        feedforward: The part of it that was feedforward [N m], shape (k, ticks + 1, 12).
+        base: Place of the trunk, x and z [m], shape (k, ticks + 1, 2).
+        base_rate: Velocity of the trunk along x and z [m/s], shape (k, ticks + 1, 2).
+        fall: Acceleration of the trunk along x and z as an IMU has it [m/s^2], (k, ticks, 2): the
+            specific force that it measures, and the gravity of the model. On a slope, along which
+            the trunk is held, it is not that of the place.
+        timestep: [s]
+    """
+
+    part: str
+    joints: Array
+    rates: Array
+    torque: Array
+    feedforward: Array
+    base: Array
+    base_rate: Array
+    fall: Array
+    timestep: float
+
+    @property
+    def strides(self) -> int:
+        """Number of strides."""
+        return len(self.joints)
+
+    @property
+    def lean(self) -> Array:
+        """Gravity of the model less that of the world, along x and z [m/s^2], shape (2,)."""
+        moving = np.diff(self.base_rate, axis=1) / self.timestep
+        return np.asarray((self.fall - moving).mean(axis=(0, 1)))
+
+    @property
+    def ticks(self) -> int:
+        """Steps of a stride."""
+        return int(self.fall.shape[1])
+
+    def motion(self, robot: Robot) -> Motion:
+        """The motion of all strides, one after the other, n = k ticks."""
+        k, ticks, dt = self.strides, self.ticks, self.timestep
+        place = np.zeros((k, ticks, 3))  # where the robot is does not matter
+        v, a = np.zeros((2, k, ticks, robot.nv))
+        v[..., [0, 2]], v[..., NB:] = self.base_rate[:, :-1], self.rates[:, :-1]
+        a[..., [0, 2]], a[..., NB:] = self.fall, np.diff(self.rates, axis=1) / dt
+        # The rates of all strides, and of neighbouring ticks, tell the direction through the noise.
+        smooth = scipy.ndimage.uniform_filter1d(self.rates[:, 1:].mean(axis=0), 5, axis=0)
+        direction = np.broadcast_to(np.tanh(smooth / _SLIDING), (k, *smooth.shape))
+        motion = Motion(
+            q=robot.q_from_base(place, self.joints[:, :-1]),
+            v=v,
+            a=a,
+            sliding=self.rates[:, 1:],
+            direction=direction,
+            tau=self.torque[:, :-1],
+            tau_rate=np.gradient(self.torque, dt, axis=1)[:, :-1],
+        )
+        return Motion(*(x.reshape(k * ticks, -1) for x in motion))
+
+    def of_ticks(self, values: Array) -> Array:
+        """Values of all strides one after the other (k ticks, ...), by stride, (k, ticks, ...)."""
+        return values.reshape(self.strides, self.ticks, *values.shape[1:])
+
+
+def recordings(
+    strides: xr.Dataset,
+    *,
+    parts: tuple[str, ...] = PARTS,
+    imu_noise: float = 0.0,
+    rng: np.random.Generator | None = None,
+) -> dict[float, tuple[PhaseRecording, ...]]:
+    """The last strides of each speed, stance and flight, as far as they are whole.
+
+    Args:
+        strides: A cell of a result, with the variables `tick_...`.
+        parts: Which phases.
+        imu_noise: Standard deviation of noise added to the trunk's acceleration [m/s^2].
+        rng: Source of that noise.
+
+    Raises:
+        InvalidInput: The result has no ticks, or no speed has two whole strides.
+    """
+    if "tick_joints" not in strides:
+        raise InvalidInput(
+            "this result has no ticks, which explain reads; run 'pronk-pin compare' again"
+        )
+    timestep, lean = float(strides.attrs["timestep"]), _lean(strides)
+    found: dict[float, tuple[PhaseRecording, ...]] = {}
+    for k, speed in enumerate(strides["speed"].to_numpy()):
+        mine = strides.isel(speed=k)
+        first = mine["tick_joint_rates"].sel(part=list(parts)).isel(joint=0)
+        ticks = np.isfinite(first.transpose("last", "part", "tick").to_numpy()).sum(axis=-1)
+        usual = np.median(ticks, axis=0)  # (parts,)
+        whole = np.flatnonzero((ticks > _SHORTEST * usual).all(axis=1) & (usual > 1.0).all())
+        if len(whole) < FEWEST:
+            continue
+        found[float(speed)] = tuple(
+            _recording(
+                mine.isel(last=whole).sel(part=part),
+                part,
+                int(ticks[whole, column].min()),
+                timestep,
+                lean,
+                imu_noise,
+                rng,
+            )
+            for column, part in enumerate(parts)
+        )
+    if not found:
+        raise InvalidInput(f"no speed has {FEWEST} whole strides at its end; explain a longer run")
+    return found
+
+
+def _lean(strides: xr.Dataset) -> Array:
+    """Model's gravity less the simulated world's, along x and z [m/s^2], shape (2,)."""
+    model = load_robot(strides.attrs["robot"]).model.gravity.linear
+    try:
+        world = Scenario.from_json(strides.attrs["scenario_parameters"]).gravity_vector
+    except (KeyError, InvalidInput):  # strides of a robot
+        return np.zeros(2)
+    return np.asarray(model - np.array(world))[[0, 2]]
+
+
+def _recording(
+    mine: xr.Dataset,
+    part: str,
+    ticks: int,
+    timestep: float,
+    lean: Array,
+    imu_noise: float,
+    rng: np.random.Generator | None,
+) -> PhaseRecording:
+    def values(name: str, last: str) -> Array:
+        array = mine[f"tick_{name}"].transpose("last", "tick", last).to_numpy()
+        return np.asarray(array[:, :ticks], dtype=float)
+
+    base_rate = values("base_rate", "axis")
+    fall = np.diff(base_rate, axis=1) / timestep + lean
+    if imu_noise > 0.0:
+        rng = np.random.default_rng() if rng is None else rng
+        fall = fall + imu_noise * rng.standard_normal(fall.shape)
+    return PhaseRecording(
+        part=part,
+        joints=values("joints", "joint"),
+        rates=values("joint_rates", "joint"),
+        torque=values("torque", "joint"),
+        feedforward=values("feedforward", "joint"),
+        base=values("base", "axis"),
+        base_rate=base_rate,
+        fall=fall,
+        timestep=timestep,
+    )

@@ -1,0 +1,239 @@
+"""Metrics: from strides to the summary, one long table with a row a number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TypeAlias
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from ..._checks import instance_of, known_name
+from ..._typing import Array, BoolArray
+from ...control import SKIPPED
+from ...robot import JOINTS
+from .effort import effort
+
+STEADY_STRIDES = 30
+"""Strides at the end of a simulation that count as steady state (paper, section III.B)."""
+
+SETTLED = 0.1
+"""Learning has settled where this share of the improvement, or less, is still missing."""
+
+LEAST_IMPROVEMENT = 0.05
+"""Share of the error that learning must take away for there to be anything that settles; a robot
+that learns nothing still drifts by a percent."""
+
+KEYS = ["robot", "base", "scenario", "speed", "controller", "seed", "joint", "metric"]
+COLUMNS = [*KEYS, "value", "unit"]
+"""Columns of the summary; rows are sorted by the keys."""
+
+
+def steady(strides: xr.Dataset) -> xr.Dataset:
+    """Select the last `STEADY_STRIDES` finished strides of each speed, renumbered from 0.
+
+    None from before the learning was switched on, or would have been for a controller that does
+    not learn, so that all are judged on the same strides: fewer, then, after a short learning. A
+    robot that finished none has NaN in all of them.
+    """
+    instance_of("strides", strides, xr.Dataset, "strides, as Results.strides() returns them")
+    count = strides["count"].to_numpy()
+    learned = _switched(strides).sum(axis=1)
+    made = np.where(learned > 0, learned, count)[count > 0]
+    last = min(STEADY_STRIDES, int(made.min())) if made.size else 0
+    offset = xr.DataArray(np.arange(last), dims="stride")
+    start = xr.DataArray(count - last, dims="speed", coords={"speed": strides["speed"]})
+    return strides.isel(stride=start + offset)
+
+
+def _switched(strides: xr.Dataset) -> BoolArray:
+    """Whether strides began after learning was switched on, or would have been, (n, strides)."""
+    if "start" not in strides or "switch" not in strides.attrs:
+        return np.asarray(strides["learning"].transpose("speed", "stride") == 1)
+    early = float(strides.attrs["timestep"]) / 2
+    start = strides["start"].transpose("speed", "stride").to_numpy()
+    return np.asarray(start > float(strides.attrs["switch"]) - early)
+
+
+def by_joint(values: xr.DataArray) -> xr.DataArray:
+    """Mean over the four legs: the axis `joint` of twelve becomes one of hip, thigh, calf."""
+    kinds = np.array([str(name).split("_")[1] for name in values["joint"].to_numpy()])
+    means = [values.isel(joint=np.flatnonzero(kinds == kind)).mean("joint") for kind in JOINTS]
+    joined = xr.concat(means, dim="joint", coords="minimal", compat="override")
+    return joined.assign_coords(joint=list(JOINTS)).transpose(*values.dims)
+
+
+def summarize(strides: xr.Dataset) -> pd.DataFrame:
+    """Compute the summary of one simulation.
+
+    Over the N steady strides k, with the error e(s) = q_d - q of a joint in stance:
+
+    Per joint (mean over the legs and the steady strides):
+        peak_error: Peak of the stance error against the unmodified reference [rad],
+            `mean_k max_s |e_k(s)|`.
+        rms_error: Its root mean square [rad], `sqrt(mean_k mean_s e_k(s)^2)`.
+        contact_error: The peak counted from the contact on, two ticks before it is felt [rad].
+        strides_to_converge: See `strides_to_converge`; thigh and calf, and `-` for the later one.
+        strides_to_beat_model: See `compare.metrics.time_to_beat`; added where the model was run
+        too.
+    Per robot:
+        strides_of_learning: Strides that were made with the learning law on; where there are some.
+        skipped_*: How many of them taught nothing, by the reasons of `control.SKIPPED`.
+        upright: 1 if it never fell; NaN, as all the others, if it finished no stride.
+        speed_error, apex_error: Steady mean minus the gait's [m/s], [m].
+        apex_deviation: Standard deviation of the apex over the steady strides [m].
+        stride_duration: Mean duration of a stride [s].
+        feedback_share: Feedback's share of the torque in stance, `rms(fb) / (rms(fb) + rms(ff))`.
+        power, cost_of_transport: Mechanical, see `compare.metrics.effort`.
+
+    Args:
+        strides: What `Simulation` recorded, as `compare.experiment.results` stores it.
+    """
+    if strides.sizes["stride"] == 0:
+        strides = strides.reindex(stride=[0])  # of nobody
+    settings = {key: strides.attrs[key] for key in ("robot", "base", "scenario", "controller")}
+    settings["seed"] = int(strides.attrs["seed"])
+    joints = by_joint(strides[["peak_error", "contact_error"]].to_dataarray("name"))
+    squares = by_joint(strides["rms_error"] ** 2)
+    per_joint = {
+        "peak_error": _array(joints.sel(name="peak_error"), "joint"),
+        "contact_error": _array(joints.sel(name="contact_error"), "joint"),
+        "rms_error": _array(squares, "joint"),
+    }
+    scalars = {
+        name: _array(strides[name])
+        for name in ("upright", "mean_speed", "apex", "duration", "learning")
+    }
+    stance = strides[["feedback", "feedforward"]].sel(part="stance")
+    torques = {str(name): _array(stance[name], "phase", "joint") for name in stance}
+    skipped = _array(strides["skipped"]) if "skipped" in strides else None
+    spent, switched = effort(strides), _switched(strides)
+    rows = []
+    for k, speed in enumerate(strides["speed"].to_numpy()):
+        count = int(strides["count"][k])
+        learning = scalars["learning"][k, :count] == 1
+        last = min(STEADY_STRIDES, int(switched[k, :count].sum()) or count)
+        end = slice(count - last, max(count, 1))  # without any, one of NaN
+        planned = {"mean_speed": speed, "apex": float(strides["planned_apex"][k])}
+        found = [
+            *_errors({name: values[k, end] for name, values in per_joint.items()}),
+            *_motion({name: values[k, end] for name, values in scalars.items()}, planned),
+            ("-", "feedback_share", _share(*(torques[name][k, end] for name in torques)), "1"),
+            *(("-", name, values[k], unit) for name, (values, unit) in spent.items()),
+            *_settling(per_joint["peak_error"][k, :count], learning),
+            *(_lessons(skipped[k, :count][learning]) if skipped is not None else ()),
+        ]
+        rows += [
+            {**settings, "speed": float(speed), **dict(zip(COLUMNS[-4:], row, strict=True))}
+            for row in found
+        ]
+    return pd.DataFrame(rows)[COLUMNS].sort_values(KEYS, ignore_index=True)
+
+
+_Row: TypeAlias = tuple[str, str, float, str]
+"""Joint, metric, value, unit."""
+
+
+def _array(values: xr.DataArray, *trailing: str) -> Array:
+    """Values as (speed, stride, ...)."""
+    return np.asarray(values.transpose("speed", "stride", *trailing).to_numpy())
+
+
+def _errors(end: Mapping[str, Array]) -> Iterator[_Row]:
+    """Errors of one robot from its steady strides, each (strides, 3)."""
+    for j, joint in enumerate(JOINTS):
+        yield joint, "peak_error", float(end["peak_error"][:, j].mean()), "rad"
+        yield joint, "rms_error", float(np.sqrt(end["rms_error"][:, j].mean())), "rad"
+        yield joint, "contact_error", float(end["contact_error"][:, j].mean()), "rad"
+
+
+def _motion(end: Mapping[str, Array], planned: Mapping[str, float]) -> Iterator[_Row]:
+    """Metrics of the motion of one robot from its steady strides, each (strides,)."""
+    yield "-", "upright", float(end["upright"].min()), "1"
+    yield "-", "speed_error", float(end["mean_speed"].mean() - planned["mean_speed"]), "m/s"
+    yield "-", "apex_error", float(end["apex"].mean() - planned["apex"]), "m"
+    yield "-", "apex_deviation", float(end["apex"].std()), "m"
+    yield "-", "stride_duration", float(end["duration"].mean()), "s"
+
+
+def _settling(peaks: Array, learning: BoolArray) -> Iterator[_Row]:
+    """Strides until the learning of one robot has settled, from its peaks (strides, 3)."""
+    if learning.any():
+        counts = [_converged(peaks[:, j], learning) for j in range(1, len(JOINTS))]
+        for joint, count in zip((*JOINTS[1:], "-"), (*counts, np.max(counts)), strict=True):
+            yield joint, "strides_to_converge", float(count), "1"
+
+
+def _lessons(reasons: Array) -> Iterator[_Row]:
+    """Strides of learning of one robot, and how many of them taught nothing, by the reason."""
+    if reasons.size:
+        yield "-", "strides_of_learning", float(reasons.size), "1"
+    for number in np.unique(reasons[reasons > 0]):
+        name = SKIPPED[int(number)].replace(" ", "_")
+        yield "-", f"skipped_{name}", float(np.count_nonzero(reasons == number)), "1"
+
+
+def feedback_share(strides: xr.Dataset) -> float:
+    """Feedback's share `rms(fb) / (rms(fb) + rms(ff))`; NaN where there is no torque at all."""
+    return _share(strides["feedback"].to_numpy(), strides["feedforward"].to_numpy())
+
+
+def _share(feedback: Array, feedforward: Array) -> float:
+    if not (np.isfinite(feedback).any() and np.isfinite(feedforward).any()):
+        return float("nan")
+    one, other = (float(np.sqrt(np.nanmean(part**2))) for part in (feedback, feedforward))
+    return one / (one + other) if one + other > 0.0 else float("nan")
+
+
+def strides_to_converge(strides: xr.Dataset, joint: str) -> float:
+    """Count the strides of learning until the peak error reaches its final level for good.
+
+    The first stride k with `p_j <= p_end + SETTLED (p_before - p_end)` for all j >= k: peak errors
+    p (means over the legs) between the steady states before learning and at the end. NaN if
+    learning did not improve the error, or if there were no strides before it.
+
+    Args:
+        strides: The strides of one robot.
+        joint: "thigh" or "calf".
+    """
+    count = int(strides["count"])
+    peak = by_joint(strides["peak_error"]).sel(joint=joint).to_numpy()[:count]
+    return _converged(peak, strides["learning"].to_numpy()[:count] == 1)
+
+
+def _converged(peak: Array, learning: BoolArray) -> float:
+    start = int(np.argmax(learning))
+    if start == 0:
+        return float("nan")
+    before = float(np.mean(peak[:start][-STEADY_STRIDES:]))
+    final = float(np.mean(peak[start:][-STEADY_STRIDES:]))
+    return settling_stride(peak[start:], before, final)
+
+
+def settling_stride(peak: Array, before: float, final: float) -> float:
+    """Number of the stride (1 is the first) from which on peaks have settled; NaN if never."""
+    if not final < (1.0 - LEAST_IMPROVEMENT) * before or peak.size == 0:
+        return float("nan")
+    outside = np.flatnonzero(peak > final + SETTLED * (before - final))
+    if outside.size == 0:
+        return 1.0
+    return float(outside[-1] + 2) if outside[-1] + 1 < peak.size else float("nan")
+
+
+def reduction(summary: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Reduction `1 - e / e_PD` of an error, on the same scenario, speed, seed and joint.
+
+    Returns:
+        The rows of the other controllers with their `value` replaced by `1 - value / PD`.
+    """
+    instance_of("summary", summary, pd.DataFrame, "the table of Results.summary()")
+    known_name("metric", metric, sorted(set(summary["metric"])))
+    rows = summary[summary["metric"] == metric]
+    keys = [key for key in KEYS if key != "controller"]
+    pd_rows = rows[rows["controller"] == "pd"].set_index(keys)["value"]
+    others = rows[rows["controller"] != "pd"].copy()
+    against = pd_rows.reindex(pd.MultiIndex.from_frame(others[keys])).to_numpy()
+    others["value"] = 1.0 - others["value"].to_numpy() / against
+    others["unit"] = "1"
+    return others

@@ -1,0 +1,158 @@
+"""Strides of learning until the error is below that of the model's feedforward."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from ..._typing import Array
+from ...control import SKIPPED
+from .metrics import by_joint, steady
+
+RIVAL = "model"
+"""The controller that learning has to beat."""
+
+LEARNER = "ilc"
+"""Practice, when it is asked whether it beats the model."""
+
+JUDGED = ("calf", "thigh")
+"""Joints whose error counts."""
+
+VARIABLES = ("count", "start", "peak_error", "learning", "upright")
+"""Variables of the strides that `practice` reads."""
+
+WINDOW = 5
+"""Strides whose mean error is compared, so that one lucky or unlucky stride decides nothing."""
+
+
+class Practice(NamedTuple):
+    """Peak errors of a simulation, by which it is compared with another."""
+
+    settings: Mapping[str, object]
+    """robot, base, scenario, controller and seed."""
+    speeds: Array
+    """Desired speeds [m/s], shape (n,)."""
+    learning: tuple[Array, ...]
+    """Peak errors of calf and thigh in the strides of learning [rad], (strides, 2) a robot."""
+    level: Array
+    """Their means in steady state [rad], shape (n, 2)."""
+    upright: Array
+    """1 for robots that never fell, NaN for those that finished no stride, shape (n,)."""
+
+
+def practice(strides: xr.Dataset) -> Practice:
+    """Read a simulation's `Practice`."""
+    names = ("robot", "base", "scenario", "controller")
+    peaks = by_joint(strides["peak_error"]).sel(joint=list(JUDGED))
+    peaks = peaks.transpose("speed", "stride", "joint")
+    level = by_joint(steady(strides)["peak_error"]).mean("stride").sel(joint=list(JUDGED))
+    count = strides["count"].to_numpy()
+    on = strides["learning"].to_numpy() == 1
+    return Practice(
+        {**{name: strides.attrs[name] for name in names}, "seed": int(strides.attrs["seed"])},
+        strides["speed"].to_numpy(),
+        tuple(peaks.to_numpy()[k, : count[k]][on[k, : count[k]]] for k in range(len(count))),
+        level.transpose("speed", "joint").to_numpy(),
+        strides["upright"].transpose("speed", "stride").min("stride").to_numpy()
+        if strides.sizes["stride"]
+        else np.full(len(count), np.nan),
+    )
+
+
+def strides_to_beat(peaks: Array, level: float) -> float:
+    """Count the strides of learning until the error is below a level for good.
+
+    The first stride below the level from which on every mean over `WINDOW` strides is, too.
+
+    Args:
+        peaks: Peak errors by stride of learning [rad], shape (strides,).
+        level: The level to beat [rad].
+
+    Returns:
+        The number of the stride, 1 for the first; NaN if it never is, or does not stay.
+    """
+    if peaks.size < WINDOW:
+        return float("nan")
+    below = np.convolve(peaks, np.full(WINDOW, 1.0 / WINDOW), "valid") < level
+    above = np.flatnonzero(~below)
+    first = int(above[-1]) + 1 if above.size else 0
+    if first >= below.size:
+        return float("nan")
+    return float(first + np.argmax(peaks[first:] < level) + 1)
+
+
+def rows_of_beating(practised: list[Practice]) -> Iterator[dict[str, object]]:
+    """Rows of the summary: `strides_to_beat_model` of every robot that learned.
+
+    For calf and thigh, and `-` for the later of the two; only where the model's feedforward was
+    run in the same world with the same seed.
+    """
+    rivals = {_place(one): one for one in practised if one.settings["controller"] == RIVAL}
+    for one in practised:
+        rival = rivals.get(_place(one))
+        if rival is None or not any(len(peaks) for peaks in one.learning):
+            continue
+        for k, speed in enumerate(one.speeds):
+            counts = [
+                strides_to_beat(one.learning[k][:, j], float(rival.level[k, j]))
+                for j in range(len(JUDGED))
+            ]
+            if one.upright[k] != 1:
+                counts = [float("nan")] * len(JUDGED)  # who fell has beaten nobody
+            for joint, value in zip((*JUDGED, "-"), (*counts, np.max(counts)), strict=True):
+                yield {
+                    **one.settings,
+                    "speed": float(speed),
+                    "joint": joint,
+                    "metric": "strides_to_beat_model",
+                    "value": float(value),
+                    "unit": "1",
+                }
+
+
+class Lessons(NamedTuple):
+    """What strides of learning were worth."""
+
+    strides: int
+    """Strides of all robots that were made with the learning law on."""
+    skipped: Mapping[str, int]
+    """How many of them taught nothing, by the reason."""
+
+    @property
+    def taught(self) -> int:
+        """How many strides something was learned from."""
+        return self.strides - sum(self.skipped.values())
+
+
+def lessons(summary: pd.DataFrame, *, controller: str) -> Lessons | None:
+    """What the strides of learning were worth to a controller; None without such strides."""
+    mine = summary[(summary["controller"] == controller) & (summary["joint"] == "-")]
+    counts = mine.groupby("metric")["value"].sum()
+    if "strides_of_learning" not in counts:
+        return None
+    skipped = {
+        reason: int(counts[name])
+        for reason in SKIPPED
+        if (name := f"skipped_{reason.replace(' ', '_')}") in counts
+    }
+    return Lessons(int(counts["strides_of_learning"]), skipped)
+
+
+def _place(one: Practice) -> tuple[object, ...]:
+    return one.settings["scenario"], one.settings["seed"], *one.speeds
+
+
+def beaten(summary: pd.DataFrame, *, controller: str) -> tuple[float, int, int]:
+    """Count the strides that it took a controller to beat the model, in calf and thigh.
+
+    Returns:
+        Median over the robots that did (NaN without one), how many did, and how many there are.
+    """
+    mine = (summary["metric"] == "strides_to_beat_model") & (summary["joint"] == "-")
+    counts = summary[mine & (summary["controller"] == controller)]["value"].to_numpy()
+    did = counts[~np.isnan(counts)]
+    return float(np.median(did)) if did.size else float("nan"), int(did.size), int(counts.size)

@@ -1,0 +1,43 @@
+"""Numbers into tables and words: the answer, its limitations, and differences between results.
+
+Comes in: a summary, or `Results`.
+Goes out: tables and text for a terminal and for the report.
+"""
+
+from .difference import format_changes
+from .limitations import limitations
+from .tables import SHOWN, WORLD, answer, beside_the_paper, sampled_worlds
+from .text import (
+    against_model,
+    answer_in_words,
+    beat_text,
+    beside_note,
+    between,
+    families,
+    format_suite,
+    format_tables,
+    number,
+    units_of_intervals,
+    verdict,
+)
+
+__all__ = [
+    "SHOWN",
+    "WORLD",
+    "against_model",
+    "answer",
+    "answer_in_words",
+    "beat_text",
+    "beside_note",
+    "beside_the_paper",
+    "between",
+    "families",
+    "format_changes",
+    "format_suite",
+    "format_tables",
+    "limitations",
+    "number",
+    "sampled_worlds",
+    "units_of_intervals",
+    "verdict",
+]

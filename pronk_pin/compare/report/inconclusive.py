@@ -1,0 +1,63 @@
+"""Why a result says nothing of practice: who fell, what taught nothing, what was not run."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from ..metrics import LEARNER, in_family, lessons
+from .tables import SHOWN
+
+_NAMES = {"pd": "PD", "model": "the model's feedforward"}
+
+
+def inconclusive(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame, against: str) -> str:
+    """Why nothing is concluded of practice in a world, as a clause; empty where something is.
+
+    Args:
+        summary: See `compare.metrics`.
+        scenario: The world, or a family of sampled ones.
+        table: Its `overview`.
+        against: What practice is compared with, "pd" or "model".
+    """
+    return _untaught(in_family(summary, scenario)) or _unpaired(table, against)
+
+
+def unsaid(table: pd.DataFrame) -> str:
+    """Why an experiment has no verdict, from the table of `answer`.
+
+    A verdict takes PD and practice, and the model's feedforward too where there are several worlds.
+    """
+    controllers = table.index.get_level_values("controller")
+    several = table.index.get_level_values("scenario").nunique() > 1
+    needed = ["pd", LEARNER, "model"] if several else ["pd", LEARNER]
+    missing = [name for name in needed if name not in controllers]
+    return f"There is no verdict: it takes {' and '.join(missing)}, which did not run."
+
+
+def _untaught(summary: pd.DataFrame) -> str:
+    """Whether no stride taught practice anything, with the reasons counted."""
+    found = lessons(summary, controller=LEARNER)
+    if found is None:
+        metrics = summary[summary["controller"] == LEARNER]["metric"]
+        if (metrics == "strides_to_converge").any():  # an earlier version's, which does not say
+            return ""
+        return "learning was never switched on, so that practice is PD"
+    if found.taught:
+        return ""
+    counted = ", ".join(f"{count} {reason}" for reason, count in found.skipped.items())
+    return f"practice learned from none of its {found.strides} strides of learning ({counted})"
+
+
+def _unpaired(table: pd.DataFrame, against: str) -> str:
+    """Whether there is no robot whose errors under the two can be compared."""
+    other = _NAMES[against]
+    down = [name for name in (LEARNER, against) if not table.loc[name, "upright"]]
+    if down:
+        names = " and under ".join({LEARNER: "practice", against: other}[name] for name in down)
+        return f"no robot stayed up under {names}"
+    compared = "reduction" if against == "pd" else "difference"
+    values = [float(table.loc[LEARNER, f"{joint}_{compared}"]) for joint in SHOWN]
+    if np.isfinite(values).all():
+        return ""
+    return f"no robot has an error to compare under both practice and {other}"

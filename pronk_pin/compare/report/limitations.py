@@ -1,0 +1,198 @@
+"""What a result does not show: its known limitations, computed from what was run."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ...control import SKIPPED, load_controller
+from ..experiment import Results
+from ..metrics import CONFIDENCE, LEAST_UNITS, family, robots, sampled, table_1, unit_of
+from .tables import SHOWN
+
+_STEADY_APEX = 0.004
+"""Standard deviation of the apex from which on a motion is not called steady [m]."""
+
+
+def limitations(results: Results) -> list[str]:
+    """Sentences, each about one limitation."""
+    summary = results.summary()
+    found = [
+        *_of_the_robot(results),
+        *_of_the_sample(results, summary),
+        *_of_the_metrics(summary),
+        *_of_the_learning(results, summary),
+        *_of_the_motion(summary),
+        *_of_the_record(results),
+    ]
+    return [text for text in found if text]
+
+
+def _of_the_robot(results: Results) -> Iterator[str]:
+    if results.experiment.base == "locked":
+        yield "The trunk is locked to the sagittal plane without rotation, as in the paper."
+    else:
+        told = [name for name in results.experiment.controllers if not load_controller(name).imu]
+        if told:
+            yield f"Under {_listed(told)} the robots know the true attitude of their trunks."
+    learners = [name for name in results.experiment.controllers if any(load_controller(name).laws)]
+    stance_only = [name for name in learners if load_controller(name).flight_law is None]
+    if stance_only:
+        yield (
+            f"{_listed(stance_only)} learn{'s' if len(stance_only) == 1 else ''} in stance only: "
+            "what is left of the error is mostly the touchdown transient, which comes from flight."
+        )
+    if results.experiment.world:
+        yield (
+            f"The simulated robot is that of {Path(results.experiment.world).name}, and the gaits "
+            "are planned with our model: errors hold what the two have otherwise."
+        )
+    yield (
+        "Simulation only. The true world is MuJoCo's, with a compliant ground; its contacts are "
+        "not those of a laboratory floor."
+    )
+
+
+def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
+    worlds, seeds = results.experiment.scenarios, results.experiment.seeds
+    first = summary["controller"].iloc[0]
+    families = {family(world) for world in worlds}
+    cells = itertools.product(sorted(families), summary["controller"].unique(), SHOWN)
+    means = sum(np.isfinite(_mean_of(summary, *cell)) for cell in cells)
+    if not means:
+        yield "No robot stayed up: there is no mean error, and no interval, in this result."
+        return
+    units = {unit_of(robots(summary, scenario=name, controller=first)) for name in families}
+    if units == {"speed"} and len(results.experiment.speeds) > 1:
+        count = "One seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
+        yield (
+            f"{count}: fewer than {LEAST_UNITS} are no sample, so intervals are drawn over the "
+            f"{len(results.experiment.speeds)} speeds. They say how the mean would scatter over "
+            "speeds and starting postures like these, not over other worlds."
+        )
+    if any(map(sampled, worlds)):
+        yield (
+            "The sampled worlds are drawn from ranges that we have chosen (docs/worlds.md has "
+            "them): intervals over them speak of worlds like these, at the speeds "
+            f"{', '.join(f'{speed:g}' for speed in results.experiment.speeds)} m/s."
+        )
+    yield (
+        "Seeds differ in the starting posture alone where the world is not sampled and has no "
+        "noise; a steady gait forgets it, and intervals over such seeds are small."
+    )
+    yield (
+        f"Each interval holds its value with {CONFIDENCE:.0%}; of the {means} mean errors here, "
+        f"about {(1 - CONFIDENCE) * means:.0f} intervals miss theirs by chance."
+    )
+
+
+def _mean_of(
+    summary: pd.DataFrame, scenario: str, controller: str, joint: str, metric: str = "peak_error"
+) -> float:
+    """Mean over the robots that did not fall; NaN without one."""
+    found = robots(summary, scenario=scenario, controller=controller, metric=metric, joint=joint)
+    return float(found.stack().mean())
+
+
+def _of_the_metrics(summary: pd.DataFrame) -> Iterator[str]:
+    def mean(metric: str, controller: str, joint: str) -> float:
+        first = family(summary["scenario"].iloc[0])
+        return _mean_of(summary, first, controller, joint, metric)
+
+    shown = {
+        name
+        for name in summary["controller"].unique()
+        if all(np.isfinite(mean("contact_error", name, joint)) for joint in SHOWN)
+    }
+    yield (
+        "Peaks are against the unmodified reference, means over the legs and the last 30 strides; "
+        "the paper does not say how its peaks are taken (`pronk-pin reproduce` tries them)."
+    )
+    later = [name for name in ("pd", "model", "ilc") if name in shown]
+    if later:
+        numbers = "; ".join(
+            f"{name} "
+            + ", ".join(f"{mean('contact_error', name, joint):.4f} rad {joint}" for joint in SHOWN)
+            for name in later
+        )
+        yield (
+            "Errors count from when the touchdown is felt, as the controller sees it. Counted from "
+            f"the contact itself, one to two ticks earlier, the mean peaks are: {numbers}."
+        )
+    if "pd" in shown:
+        printed = table_1()
+        printed = printed[(printed["controller"] == "pd") & (printed["joint"] == "thigh")]
+        ratio = mean("peak_error", "pd", "thigh") / float(printed["value"].mean())
+        yield (
+            f"Thigh errors under PD are {ratio:.1f} times the paper's: its gaits and its simulator "
+            "are not published."
+        )
+    if (summary["metric"] == "cost_of_transport").any():
+        yield (
+            "Cost of transport is mechanical: positive work of the motors over the weight of the "
+            "robot without its load; losses in the windings are not in it."
+        )
+
+
+def _of_the_learning(results: Results, summary: pd.DataFrame) -> Iterator[str]:
+    settled = summary[(summary["metric"] == "strides_to_converge") & (summary["joint"] == "-")]
+    for controller, rows in settled[settled["value"].isna()].groupby("controller"):
+        of = int((settled["controller"] == controller).sum())
+        places = ", ".join(f"{n} in {name}" for name, n in rows["scenario"].value_counts().items())
+        yield f"{len(rows)} of {of} robots under {controller} have not settled: {places}."
+    for cell in results.experiment.cells():
+        if not any(load_controller(cell.controller).laws):
+            continue
+        strides = results.strides(cell, ["skipped", "learning"])
+        reasons = strides["skipped"].to_numpy()[strides["learning"].to_numpy() == 1]
+        skipped = reasons[reasons > 0].astype(int)
+        if skipped.size:
+            counts = ", ".join(
+                f"{np.count_nonzero(skipped == k)} {SKIPPED[k]}" for k in np.unique(skipped)
+            )
+            yield (
+                f"{cell.controller} in {cell.scenario}, seed {cell.seed}: nothing was learned from "
+                f"{skipped.size} of {reasons.size} strides ({counts})."
+            )
+
+
+def _of_the_motion(summary: pd.DataFrame) -> Iterator[str]:
+    fallen = summary[(summary["metric"] == "upright") & (summary["value"] == 0.0)]
+    for (scenario, controller), rows in fallen.groupby(["scenario", "controller"]):
+        speeds = ", ".join(f"{speed:g}" for speed in sorted(set(rows["speed"])))
+        yield (
+            f"In {scenario} under {controller} {_robots(len(rows))} fell ({speeds} m/s): the "
+            "errors of those that fell are not in the means."
+        )
+    idle = summary[(summary["metric"] == "upright") & summary["value"].isna()]
+    for (scenario, controller), rows in idle.groupby(["scenario", "controller"]):
+        yield f"In {scenario} under {controller} {_robots(len(rows))} finished no stride."
+    keys = ["scenario", "controller", "speed", "seed"]
+    fell = pd.MultiIndex.from_frame(fallen[keys])
+    apex = summary[(summary["metric"] == "apex_deviation") & (summary["value"] > _STEADY_APEX)]
+    apex = apex[~pd.MultiIndex.from_frame(apex[keys]).isin(fell)]
+    for (scenario, controller), rows in apex.groupby(["scenario", "controller"]):
+        yield (
+            f"In {scenario} under {controller} the apex of {_robots(len(rows))} still varies by "
+            f"more than {1e3 * _STEADY_APEX:.0f} mm (s.d.) from stride to stride."
+        )
+
+
+def _of_the_record(results: Results) -> Iterator[str]:
+    runs = results.provenance["runs"]
+    if not results.provenance["finished"]:
+        yield "The run is not on record as finished."
+    if any((run.get("git") or "").endswith("changed") for run in runs):
+        yield "It was made from a source that differs from the commit named below."
+
+
+def _robots(count: int) -> str:
+    return f"{count} robot" + ("s" if count != 1 else "")
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,20 @@
+"""One simulation: n robots, one controller, one world, event by event.
+
+Comes in: gaits, a `ControllerSpec`, a `Scenario`, a `Schedule`.
+Goes out: a log of strides and ticks, and its labelled dataset.
+"""
+
+from .dataset import to_dataset
+from .memory import SHORTER, check_memory, number_of_robots
+from .schedule import Schedule
+from .simulation import Progress, Simulation
+
+__all__ = [
+    "SHORTER",
+    "Progress",
+    "Schedule",
+    "Simulation",
+    "check_memory",
+    "number_of_robots",
+    "to_dataset",
+]

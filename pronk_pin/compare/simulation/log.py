@@ -1,0 +1,304 @@
+"""Logs of a simulation, tick by tick in one phase, and stride by stride; preallocated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from ... import control
+from ..._typing import Array, BoolArray, IntArray
+from ...control import (
+    PARTS,
+    Gains,
+    PhaseLog,
+    StrideRecord,
+    Tape,
+    phase_grid,
+    resample,
+    roll_pitch_yaw,
+)
+from ...gait import Gait
+from ...robot import NL, rotation_matrix
+from ..world import Motion
+
+_EVERY = 4
+SAMPLES = (control.SAMPLES - 1) // _EVERY + 1
+"""Samples of the phase grid on which strides are kept: every fourth one of the control's."""
+
+LAST = 12
+"""Strides at the end that are kept tick by tick."""
+
+SHORTEST_STRIDE = 0.5
+"""Strides shorter than this share of the planned duration do not occur: it sizes the log."""
+
+LONGEST_PART = 1.25
+"""Share of the planned duration of a part up to which its ticks are kept."""
+
+
+class TickLog:
+    """Log of the current phase of n robots, tick by tick; the next phase overwrites it.
+
+    Attributes:
+        size: Ticks of the longest phase.
+        joints, joint_rates: Measured joint angles and velocities, shape (n, size, 12).
+        feedback, feedforward, missing: Torques [N m], see `PhaseLog`, shape (n, size, 12).
+        base, base_rate: Trunk x, z [m] and their rates [m/s], shape (n, size, 2).
+        balance: Torques that keep the trunk up, see `control.feedback.balance` [N m], shape (n,
+        size, 12).
+        pose, twist: Trunk in Pinocchio's layout, shape (n, size, 7) and (n, size, 6).
+        specific_force: What the accelerometer says, trunk's axes [m/s^2], shape (n, size, 3).
+        force: Ground's force on each foot, world frame [N], shape (n, size, 4, 3).
+        turns: Whether the trunk can turn; else `pose`, `twist` and `balance` are of no use.
+        inertial: Whether an IMU is read at each tick; else `specific_force` is of no use.
+    """
+
+    def __init__(self, n: int, size: int, *, turns: bool = True, inertial: bool = False) -> None:
+        self.size, self.turns, self.inertial = size, turns, inertial
+        self._states = ["joints", "joint_rates", "base", "base_rate", "force"]
+        self._torques = ["feedback", "feedforward", "missing"]
+        if turns:
+            self._states += ["pose", "twist"]
+            self._torques += ["balance"]
+        self._readings = ["specific_force"] if inertial else []
+        self.specific_force = np.zeros((n, size, 3))
+        self.joints, self.joint_rates = np.zeros((2, n, size, NL))
+        self.feedback, self.feedforward, self.missing, self.balance = np.zeros((4, n, size, NL))
+        self.base, self.base_rate = np.zeros((2, n, size, 2))
+        self.force = np.zeros((n, size, NL // 3, 3))
+        self.pose, self.twist = np.zeros((n, size, 7)), np.zeros((n, size, 6))
+        self.pose[..., 6] = 1.0  # level, until something else is written
+
+    def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
+        """Write a motion of robots from a tick on."""
+        at, ticks = _compact(rows), slice(tick, tick + motion.base.shape[1])
+        for name in self._states:
+            getattr(self, name)[at, ticks] = getattr(motion, name)
+
+    def torques(
+        self, rows: IntArray, tape: Tape, gains: Gains, tau_max: Array, played: int
+    ) -> None:
+        """Write the torques that tapes commanded in the ticks that they were played for."""
+        at, ticks = _compact(rows), slice(tape.begin, played)
+        feedforward = tape.feedforward[:, ticks]
+        feedback = gains.feedback(
+            tape.position[:, ticks] - self.joints[at, ticks],
+            tape.velocity[:, ticks] - self.joint_rates[at, ticks],
+        )
+        self.feedback[at, ticks], self.feedforward[at, ticks] = feedback, feedforward
+        asked = feedback + feedforward
+        if self.turns:
+            asked += self.balance[at, ticks]
+        self.missing[at, ticks] = np.clip(asked, -tau_max, tau_max) - asked
+
+    def torque(self, rows: IntArray, ticks: slice) -> Array:
+        """Commanded torque of the motors, within their limits [N m], shape (m, ticks, 12)."""
+        at = _compact(rows), ticks
+        torque = self.feedback[at] + self.feedforward[at]
+        torque += self.missing[at]
+        if self.turns:
+            torque += self.balance[at]
+        return torque
+
+    def take_torques(self, rows: IntArray, other: TickLog) -> None:
+        """Copy the torques of another log."""
+        for name in self._torques:
+            getattr(self, name)[rows] = getattr(other, name)[rows]
+
+    def phase(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+        """Make the controller's log of a phase that has ended after so many ticks (m,).
+
+        It may share the log's memory, and holds until something else is written.
+        """
+        at = _compact(rows), slice(int(length.max()))
+        return PhaseLog(
+            self.joints[at],
+            self.joint_rates[at],
+            self.feedback[at],
+            self.feedforward[at],
+            self.missing[at],
+            length,
+            felt,
+            load=self.force[at][..., 2].sum(axis=-1),
+            pose=self.pose[at] if self.turns else None,
+            twist=self.twist[at] if self.turns else None,
+            specific_force=self.specific_force[at] if self.inertial else None,
+        )
+
+    def attitude(self, rows: IntArray, length: IntArray, index: Array) -> Array:
+        """Roll, pitch and heading at fractional ticks (m, k) before the lengths (m,) [rad]."""
+        if not self.turns:
+            return np.zeros((*index.shape, 3))
+        quaternion = resample(self.pose[rows, : int(length.max()), 3:], index)
+        quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
+        return roll_pitch_yaw(rotation_matrix(quaternion))
+
+    def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
+        """Move the ticks from `start` (m,) on to the beginning, as the first of the next phase."""
+        kept = start[:, None] + np.arange(ticks)  # (m, ticks)
+        for name in (*self._states, *self._torques, *self._readings):
+            channel = getattr(self, name)
+            channel[rows, :ticks] = channel[rows[:, None], kept]
+
+
+def _compact(rows: IntArray) -> IntArray | slice:
+    """The rows as a slice where they follow each other, which is read without being copied."""
+    first, last = int(rows[0]), int(rows[-1])
+    together = last - first == len(rows) - 1 and bool(np.all(np.diff(rows) == 1))
+    return slice(first, last + 1) if together else rows
+
+
+class StrideLog:
+    """The strides of n robots, numbered from 0; a stride goes from touchdown to touchdown.
+
+    Attributes:
+        count: Strides that each robot has finished, shape (n,).
+        scalars: Quantities of a stride by name, each of shape (n, strides); NaN where none.
+        peak_error: Peak of the stance error [rad], shape (n, strides, 12).
+        rms_error: Root mean square of the stance error [rad], shape (n, strides, 12).
+        contact_error: Peak from the contact on, before it was felt [rad], shape (n, strides, 12).
+        curves: The `error` [rad], `feedback` and `feedforward` [N m] of stance and flight, each of
+            shape (n, strides, 2, samples, 12).
+        base: Trunk x, z [m], shape (n, strides, 2, samples, 2).
+        attitude: Trunk roll, pitch, heading [rad], shape (n, strides, 2, samples, 3).
+    """
+
+    SCALARS = (
+        *("start", "duration", "stance", "speed", "apex", "upright", "learning", "skipped"),
+        *("heading", "tilt", "flight_reference"),
+    )
+    CURVES = ("error", "feedback", "feedforward")
+    TICKS: ClassVar = {
+        "joints": (NL,),
+        "joint_rates": (NL,),
+        "torque": (NL,),
+        "feedforward": (NL,),
+        "base": (2,),
+        "base_rate": (2,),
+        "force": (NL // 3, 3),
+    }
+    """Channels of the last strides that are kept at every tick, with the shape of one tick."""
+
+    def __init__(self, gaits: Sequence[Gait], duration: float, timestep: float) -> None:
+        n = len(gaits)
+        parts = [[getattr(gait, part).duration for gait in gaits] for part in PARTS]
+        self._planned = np.array(parts)  # (2, n)
+        whole = self._planned.sum(axis=0)
+        size = int(np.ceil(duration / (SHORTEST_STRIDE * whole.min()))) + 1
+        self._timestep = timestep
+        self._grid = phase_grid(SAMPLES)
+        self._begin_x = np.zeros(n)
+        self.count = np.zeros(n, dtype=np.intp)
+        self.scalars = {name: np.full((n, size), np.nan) for name in self.SCALARS}
+        self.peak_error, self.rms_error, self.contact_error = np.full((3, n, size, NL), np.nan)
+        shape = (n, size, len(PARTS), SAMPLES)
+        self.curves = {name: np.full((*shape, NL), np.nan, np.float32) for name in self.CURVES}
+        self.base = np.full((*shape, 2), np.nan, np.float32)
+        self.attitude = np.full((*shape, 3), np.nan, np.float32)
+        # Strides are kept in turn, and only near the end of the simulation.
+        self._near = (LAST + 1) * LONGEST_PART * whole
+        self._close = np.zeros(n, dtype=bool)
+        ticks = int(np.ceil(LONGEST_PART * self._planned.max() / timestep))
+        shape = (n, LAST, len(PARTS), ticks)
+        self._ticks = {
+            name: np.full((*shape, *one), np.nan, np.float32) for name, one in self.TICKS.items()
+        }
+
+    def begin(self, rows: IntArray, start: Array, learning: BoolArray, *, left: Array) -> None:
+        """Begin strides at the times `start` (m,) [s], with `left` (m,) [s] to go."""
+        at = (rows, self.count[rows])
+        self.scalars["start"][at], self.scalars["learning"][at] = start, learning
+        self._close[rows] = left < self._near[rows]
+
+    def stance(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
+        """Log a stance of so many ticks (m,)."""
+        at = (rows, self.count[rows])
+        self.peak_error[at] = np.abs(record.error).max(axis=1)
+        self.rms_error[at] = np.sqrt(np.mean(record.error**2, axis=1))
+        self.contact_error[at] = np.maximum(self.peak_error[at], record.contact_error)
+        self.scalars["stance"][at] = length * self._timestep
+        self._begin_x[rows] = log.base[rows, 0, 0]
+        self._keep(0, rows, record, log, length)
+
+    def flight(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
+        """Log a flight of so many ticks (m,)."""
+        ticks = np.arange(int(length.max()))
+        height = log.base[_compact(rows), : len(ticks), 1]
+        highest = np.where(ticks < length[:, None], height, -np.inf).max(axis=1)
+        self.scalars["apex"][rows, self.count[rows]] = highest
+        self._keep(1, rows, record, log, length)
+
+    def _keep(
+        self, part: int, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray
+    ) -> None:
+        """Curves of a part of the strides, and its ticks where the end is near."""
+        at = (rows, self.count[rows], part)
+        for name in self.CURVES:
+            self.curves[name][at] = getattr(record, name)[:, ::_EVERY]
+        index = self._grid * self._planned[part, rows, None] / self._timestep
+        index = np.minimum(index, length[:, None] - 1.0)
+        self.base[at] = resample(log.base[_compact(rows), : int(length.max())], index)
+        self.attitude[at] = log.attitude(rows, length, index)
+        close = self._close[rows]
+        if close.any():
+            self._keep_ticks(part, rows[close], log, length[close])
+
+    def _keep_ticks(self, part: int, rows: IntArray, log: TickLog, length: IntArray) -> None:
+        slot, size = self.count[rows] % LAST, self._ticks["base"].shape[3]
+        ticks = slice(min(int(length.max()), size))
+        who, beyond = np.nonzero(np.arange(size) >= length[:, None])
+        at = _compact(rows), ticks
+        for name, store in self._ticks.items():
+            values = log.torque(rows, ticks) if name == "torque" else getattr(log, name)[at]
+            store[rows, slot, part, ticks] = values
+            store[rows[who], slot[who], part, beyond] = np.nan
+
+    def end(
+        self,
+        rows: IntArray,
+        duration: Array,
+        x: Array,
+        upright: BoolArray,
+        skipped: IntArray,
+        *,
+        tilt: Array | float = 0.0,
+        heading: Array | float = 0.0,
+        flight_reference: Array | float = np.nan,
+    ) -> None:
+        """End strides after their durations (m,) [s], with the trunk at x (m,) [m].
+
+        Args:
+            rows: Whose.
+            duration: From touchdown to touchdown [s].
+            x: Where the trunk is [m].
+            upright: Whether they have not fallen.
+            skipped: Why nothing is learned from them, see `StrideSelection`.
+            tilt: Largest angle between trunk and gait [rad].
+            heading: Of the trunk at touchdown [rad].
+            flight_reference: How long the reference of the flight lasted [s].
+        """
+        at = (rows, self.count[rows])
+        self.scalars["duration"][at] = duration
+        self.scalars["speed"][at] = (x - self._begin_x[rows]) / duration
+        self.scalars["upright"][at] = upright
+        self.scalars["skipped"][at] = skipped
+        self.scalars["tilt"][at], self.scalars["heading"][at] = tilt, heading
+        self.scalars["flight_reference"][at] = flight_reference
+        self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
+
+    def finish(self, upright: BoolArray) -> None:
+        """End the log; a fall in an unfinished stride counts for the last finished one."""
+        self.scalars["upright"][np.arange(len(upright)), np.maximum(self.count - 1, 0)] = upright
+
+    def ticks(self) -> dict[str, Array]:
+        """The last strides at every tick, by name: shape (n, last, 2, ticks, ...), oldest first.
+
+        NaN where a part has ended, and before a robot's first stride.
+        """
+        order = (self.count[:, None] + np.arange(LAST)) % LAST  # (n, last)
+        rows = np.arange(len(order))[:, None]
+        sorted_ = {name: store[rows, order] for name, store in self._ticks.items()}
+        used = np.isfinite(sorted_["base"]).any(axis=(0, 1, 2, 4))
+        length = int(np.flatnonzero(used).max(initial=0)) + 1
+        return {name: values[:, :, :, :length] for name, values in sorted_.items()}

@@ -1,0 +1,192 @@
+"""Simulation of n robots, one controller and one scenario, at 1 kHz, from event to event.
+
+A stance ends by time, as its reference does; a flight ends with the touchdown that the feet feel.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeAlias
+
+import numpy as np
+
+from ..._checks import Interval, flag, instance_of, known_name, whole
+from ..._typing import Array, IntArray
+from ...control import Controller, ControllerSpec
+from ...errors import InvalidInput
+from ...gait import Gait, known_gaits
+from ...robot import BASES, Robot
+from ..world import Scenario, without_warnings
+from .log import StrideLog
+from .memory import check_memory
+from .player import Player
+from .schedule import Schedule
+
+Progress: TypeAlias = Callable[[int], object]
+"""Called with the number of time steps done since the last call."""
+
+
+class Simulation:
+    """Simulation of n robots at their own speeds under one controller in one scenario.
+
+    All robots are played from event to event together, each on a clock of its own: one goes on in
+    its stride while another already waits for the next. Each makes as many strides as begin before
+    the end of the schedule.
+
+    Args:
+        robot: The robot.
+        gaits: The gait of each of the n robots.
+        spec: The controller.
+        scenario: The world.
+        schedule: What happens when.
+        rng: Source of the scatter at the start.
+        feedforward: Feedforward to begin with [N m], shape (n, 2, samples, 12).
+        flight: How long the references of the flights last at first [s], shape (n,); by default as
+            the gaits plan them.
+        base: How the trunks may move: "locked" to x and z, "sagittal" with pitch, or "free".
+        chunked: Let servos play whole tapes, as MuJoCo can where the law is affine between two
+            events, or as many ticks as the motors are late by. Otherwise the feedback is computed
+            tick by tick, as it always is where the scenario is neither. The motion is the same.
+        threads: Threads that share the robots, whose trunks must be locked for that: each goes
+            through the strides of its own ones, and what one computes hides behind the others'
+            physics. By default the caller's only, as simulations run side by side in processes.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gaits: Sequence[Gait],
+        spec: ControllerSpec,
+        scenario: Scenario,
+        *,
+        schedule: Schedule,
+        rng: np.random.Generator,
+        feedforward: Array | None = None,
+        flight: Array | None = None,
+        base: str = "locked",
+        chunked: bool = True,
+        threads: int = 1,
+    ) -> None:
+        gaits = known_gaits(robot, gaits)
+        instance_of("scenario", scenario, Scenario, "a Scenario, as load_scenario() returns it")
+        instance_of("schedule", schedule, Schedule)
+        instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
+        threads = whole("threads", threads, Interval(high=1024))
+        flag("chunked", chunked)
+        known_name("base", base, BASES)
+        check_memory(gaits, schedule.duration)
+        n, dt = len(gaits), scenario.timestep
+        if threads < 1 or (threads > 1 and base != "locked"):
+            raise InvalidInput("threads must be 1 or more, and 1 where the base is not locked")
+        self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
+        self.controller = Controller(
+            robot, gaits, spec, timestep=dt, feedforward=feedforward, flight=flight, base=base
+        )
+        self._threads = threads
+        self.player = Player(
+            robot,
+            gaits,
+            spec,
+            scenario,
+            ticks=self.controller.max_ticks,
+            rng=rng.spawn(1)[0],
+            base=base,
+            balance=self.controller.balance,
+            chunked=chunked,
+        )
+        self.world, self.upright = self.player.world, self.player.upright
+        self.strides = StrideLog(gaits, schedule.duration, dt)
+        self._clock = np.zeros(n, dtype=np.intp)  # ticks since the first stride began
+        self._stand(robot, rng)
+
+    def _stand(self, robot: Robot, rng: np.random.Generator) -> None:
+        """Set the robots on the ground in the posture of their first stride."""
+        start = np.array([0.0])
+        joints = np.stack([gait.stance.joint_reference(start)[0][0] for gait in self._gaits])
+        base = np.array([gait.stance.base_reference(start)[0][0] for gait in self._gaits])
+        joints += self.schedule.scatter * rng.standard_normal(joints.shape)
+        place = np.column_stack([np.zeros(len(joints)), base[:, 1]])
+        self.world.reset(place, joints, pitch=base[:, 2])
+
+    def run(self, progress: Progress | None = None) -> StrideLog:
+        """Simulate to the end of the schedule.
+
+        Args:
+            progress: Called with the number of steps done since the last call.
+        """
+        schedule = self.schedule
+        steps = round((schedule.practice + schedule.learning) / self._dt)
+        done, lock = 0, threading.Lock()
+
+        def report() -> None:
+            nonlocal done
+            with lock:
+                before, done = done, min(int(self._clock.mean()), steps)
+                if progress is not None and done > before:
+                    progress(done - before)
+
+        def strides(rows: IntArray) -> None:
+            while (going := rows[self._clock[rows] < steps]).size:
+                self._stride(going, steps=steps)
+                report()
+
+        with without_warnings(), ThreadPoolExecutor(self._threads) as pool:
+            self._startup()
+            shares = np.array_split(np.arange(len(self._gaits)), self._threads)
+            side_by_side = pool.map if self._threads > 1 else map
+            list(side_by_side(strides, shares))  # an error in a thread is raised here
+        if progress is not None:
+            progress(steps - done)
+        self.strides.finish(self.upright)
+        return self.strides
+
+    def _startup(self) -> None:
+        """Stand; the last ticks are as if the first stance's touchdown had been sensed late."""
+        rows, late = np.arange(len(self._gaits)), self.controller.spec.touchdown_ticks
+        ticks = round(self.schedule.startup / self._dt) + late
+        for piece in np.array_split(np.arange(ticks), -(-ticks // self.player.log.size)):
+            self.player.play(rows, self.controller.stand(len(piece)), part=None)
+        self.player.rewind(rows, np.full(len(rows), len(piece) - late))
+
+    def _stride(self, rows: IntArray, *, steps: int) -> None:
+        """Simulate one stride of some robots, from touchdown to touchdown."""
+        controller, strides, player = self.controller, self.strides, self.player
+        log, late = player.log, controller.spec.touchdown_ticks
+        start = self._clock[rows]
+        learning = start >= round(self.schedule.practice / self._dt)
+        learning &= any(law is not None for law in controller.spec.laws)
+        strides.begin(rows, self._seconds(start), learning, left=self._seconds(steps - start))
+
+        stance = player.play(rows, controller.touchdown(rows, learning), part=0)
+        tape, record = controller.liftoff(rows, player.measured(rows, stance, felt=late))
+        if player.seen is not log:  # what is kept is the truth
+            record = controller.record(0, rows, log.phase(rows, stance, felt=late))
+        strides.stance(rows, record, log, stance)
+        tilt = player.tilt(0, rows, stance)
+
+        # A touchdown is felt late: the last ticks of the flight's tape are the next stance's.
+        flight = player.play(rows, tape, part=1) - late
+        duration, upright = self._seconds(stance + flight), self.upright[rows]
+        tilt = np.maximum(tilt, player.tilt(1, rows, flight))
+        known = player.measured(rows, flight)
+        record = controller.landing(rows, known, duration, upright)
+        if player.seen is not log:
+            record = controller.record(1, rows, log.phase(rows, flight))
+        strides.flight(rows, record, log, flight)
+        player.rewind(rows, flight)
+        strides.end(
+            rows,
+            duration,
+            log.base[rows, 0, 0],
+            upright,
+            controller.skipped[rows],
+            tilt=tilt,
+            heading=log.attitude(rows, flight, np.zeros((len(rows), 1)))[:, 0, 2],
+            flight_reference=controller.flight[rows],
+        )
+        self._clock[rows] = start + stance + flight
+
+    def _seconds(self, ticks: IntArray) -> Array:
+        return np.asarray(ticks * self._dt, dtype=float)

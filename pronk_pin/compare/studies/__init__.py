@@ -1,0 +1,40 @@
+"""Questions that take more than one experiment to answer.
+
+Comes in: a robot, speeds, controllers, or `Results`.
+Goes out: gain reduction, seeding, transfer, prediction, reproduction of Table I, and the loop
+closed with an identified model.
+"""
+
+from .gain_reduction import describe_gains, sweep_gains
+from .identified_models import close_loop, format_loop
+from .prediction import (
+    STRIDES,
+    Prediction,
+    compare_prediction,
+    describe_prediction,
+    practise,
+    stored_practice,
+)
+from .reproduce import format_reproduction
+from .seeding import describe_seeding, measure_seeding, stayed_up
+from .transfer import TOLERANCE, describe_transfers, measure_transfers
+
+__all__ = [
+    "STRIDES",
+    "TOLERANCE",
+    "Prediction",
+    "close_loop",
+    "compare_prediction",
+    "describe_gains",
+    "describe_prediction",
+    "describe_seeding",
+    "describe_transfers",
+    "format_loop",
+    "format_reproduction",
+    "measure_seeding",
+    "measure_transfers",
+    "practise",
+    "stayed_up",
+    "stored_practice",
+    "sweep_gains",
+]

@@ -1,0 +1,284 @@
+"""Predicted errors of learning, by lifted model and rehearsal, beside the measured ones."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+
+from ..._checks import Interval, reals, whole
+from ..._typing import Array
+from ...control import (
+    ControllerSpec,
+    GuidedStrides,
+    LearningLaw,
+    LiftedModel,
+    ModelBasedILC,
+    Settings,
+    StrideRecord,
+    lifted_model,
+    load_controller,
+    phase_grid,
+)
+from ...control.prediction import Analysis, analyze, predict, rehearse
+from ...dynamics import Rotors
+from ...errors import InvalidInput
+from ...gait import load_library
+from ...robot import JOINTS, load_robot
+from ..experiment import Results
+from ..simulation import Schedule, Simulation, to_dataset
+from ..world import Scenario
+
+_PRACTICE = 6.0
+_WIDTH = 96
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Errors of the strides of learning, predicted and measured.
+
+    Attributes:
+        controller: Short name of the controller.
+        speed: Desired speed [m/s].
+        analysis: What linear algebra says of the law along the gait.
+        predicted: RMS of the stance error by the lifted model, of hip, thigh and calf [rad],
+            shape (strides + 1, 3); the first is the stride before learning.
+        rehearsed: The same by the model's own practice; NaN from where it does not go on.
+        measured: The same as it happened.
+    """
+
+    controller: str
+    speed: float
+    analysis: Analysis
+    predicted: Array
+    rehearsed: Array
+    measured: Array
+
+    @property
+    def factor(self) -> Array:
+        """Ratio >= 1 of predicted and measured error, thigh and calf together, by stride."""
+        return _factor(self.predicted, self.measured)
+
+    @property
+    def rehearsed_factor(self) -> Array:
+        """The same for the rehearsal."""
+        return _factor(self.rehearsed, self.measured)
+
+
+STRIDES = Interval(1, 100_000)
+"""Strides of learning that can be predicted."""
+
+
+def practise(
+    spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario, *, robot: str, strides: int
+) -> xr.Dataset:
+    """Simulate a short learning run, with the law of the stance only, and flights as planned.
+
+    Raises:
+        InvalidInput: The controller does not learn in stance.
+    """
+    _law(spec)
+    speeds, strides = reals("speeds", speeds), whole("strides", strides, STRIDES)
+    if not speeds:
+        raise InvalidInput("no speeds; give at least one")
+    library = load_library(robot)
+    gaits = [library.at(speed) for speed in speeds]
+    longest = max(gait.duration for gait in gaits)
+    simulation = Simulation(
+        load_robot(robot),
+        gaits,
+        replace(spec, flight_law=None, timing=None),
+        scenario,
+        schedule=Schedule(practice=_PRACTICE, learning=1.25 * (strides + 2) * longest),
+        rng=np.random.default_rng(0),
+    )
+    return to_dataset(simulation.run(), load_robot(robot), gaits, attributes={"robot": robot})
+
+
+def stored_practice(
+    results: Results, spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario
+) -> xr.Dataset:
+    """Load the strides of learning from a results folder, for comparison with a prediction.
+
+    The prediction covers a law of the stance, with flights as planned, on a trunk that is locked.
+
+    Args:
+        results: The results.
+        spec: The controller that practised.
+        speeds: Speeds that are asked for [m/s].
+        scenario: In which world.
+
+    Raises:
+        InvalidInput: More was learned than the prediction covers, or elsewhere.
+    """
+    _law(spec)
+    experiment = results.experiment
+    if not _covered(spec):
+        known = [name for name in experiment.controllers if _covered(load_controller(name))]
+        remedy = (
+            f"choose {' or '.join(known)}, which this result has"
+            if known
+            else "make a result with 'pronk-pin compare --controllers ilc-stance', or leave "
+            "--result out, and a practice in stance only is simulated"
+        )
+        raise InvalidInput(
+            f"controller '{spec.name}' has learned in flight, too, or how long a flight lasts, and "
+            f"the prediction covers the stance only; {remedy}"
+        )
+    if experiment.base != "locked":
+        raise InvalidInput(
+            f"this result has base '{experiment.base}', and the prediction a locked one; make one "
+            "with --base locked"
+        )
+    for speed in speeds:
+        if not np.isclose(experiment.speeds, speed, atol=1e-6).any():
+            there = ", ".join(f"{one:g}" for one in experiment.speeds)
+            raise InvalidInput(f"this result has no speed {speed:g} m/s; choose from {there}")
+    return results.all_strides(controller=spec.name, scenario=scenario.name)
+
+
+def compare_prediction(
+    spec: ControllerSpec, strides: xr.Dataset, speed: float, scenario: Scenario, *, number: int
+) -> Prediction:
+    """Predict the errors of learning from the last stride before it, beside the measured ones.
+
+    The model has the rotors and the viscous friction of the scenario, as data sheets tell them;
+    a law that needs a model has one of its own without them, as on the robot.
+
+    Args:
+        spec: The controller that practised.
+        strides: Its strides, see `compare.simulation.dataset`.
+        speed: Which robot [m/s].
+        scenario: The world that they were made in.
+        number: Strides of learning; fewer if there are fewer.
+
+    Raises:
+        InvalidInput: The controller does not learn, or there are no strides before its learning.
+    """
+    law = _law(spec)
+    robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
+    settings = Settings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
+    rotors = Rotors(scenario.armature, scenario.damping)
+    model = lifted_model(robot, gait, settings, rotors=rotors)
+    if isinstance(law, ModelBasedILC):
+        law = law.along([lifted_model(robot, gait, settings)])
+    mine = strides.sel(speed=speed, method="nearest").sel(part="stance")
+    made = int(mine["count"])
+    first = int(np.argmax(mine["learning"].to_numpy()[:made] == 1))
+    if first == 0:
+        raise InvalidInput("no strides before the learning; give the practice some seconds")
+    error = mine["error"].to_numpy()[first - 1 : min(made, first + number)]
+    begin = _record(mine.isel(stride=first - 1), model)
+    guided = GuidedStrides(robot, gait, settings, rotors)
+    kept = slice(None, None, (model.shape[0] - 1) // (error.shape[1] - 1))
+    return Prediction(
+        spec.name,
+        speed,
+        analyze(law, model, begin),
+        predicted=_by_joint(predict(law, model, begin, len(error) - 1)[:, kept]),
+        rehearsed=_by_joint(rehearse(guided, law, begin, len(error) - 1)[:, kept]),
+        measured=_by_joint(error),
+    )
+
+
+def describe_prediction(prediction: Prediction) -> str:
+    """Format the analysis and the comparison for a terminal."""
+    found = prediction.analysis
+    quasi = found.quasi_static
+    stable = "stable" if found.radius < 1.0 else "unstable"
+    left = 1.0 - quasi.left
+    lines = [
+        f"{prediction.controller} at {prediction.speed:g} m/s",
+        f"  spectral radius           {found.radius:8.3f}  ({stable})",
+        f"  with every stride reset   {found.stride_radius:8.3f}",
+        f"  largest singular value    {found.largest_gain:8.3f}",
+        f"  transient growth          {found.transient:8.3f}",
+        "  error left in the limit   "
+        + ", ".join(
+            f"{joint} {_percent(value)}" for joint, value in zip(JOINTS, found.limit, strict=True)
+        ),
+        "  radius with other motors  "
+        + ", ".join(
+            f"x{factor:g} {radius:.3f}" for factor, radius in found.with_gain_error.items()
+        ),
+        "  radius with delay         "
+        + ", ".join(f"{delay} samples {radius:.3f}" for delay, radius in found.with_delay.items()),
+        "",
+        textwrap.fill(_in_words(quasi.gain, quasi.memory, quasi.multiplier, left), _WIDTH),
+        "",
+        "           measured [rad]    lifted model [rad]        rehearsed [rad]",
+        "  stride    thigh    calf     thigh    calf  factor     thigh    calf  factor",
+    ]
+    ways = (
+        ("lifted model", prediction.predicted, prediction.factor),
+        ("rehearsal", prediction.rehearsed, prediction.rehearsed_factor),
+    )
+    for k, measured in enumerate(prediction.measured):
+        row = f"  {k:6d}  {measured[1]:7.4f} {measured[2]:7.4f}"
+        for _, rms, factor in ways:
+            row += f"   {rms[k, 1]:7.4f} {rms[k, 2]:7.4f} {factor[k]:7.2f}"
+        lines.append(row)
+    lines.append("")
+    for name, _, factor in ways:
+        worst = int(np.argmax(np.nan_to_num(factor, nan=-1.0)))
+        lines.append(f"{name}: worst factor {factor[worst]:.2f}, in stride {worst}")
+    return "\n".join(lines)
+
+
+def _factor(one: Array, other: Array) -> Array:
+    """Ratio >= 1 of two RMS errors, thigh and calf together, shape (strides,)."""
+    a, b = (np.sqrt((rms[:, 1:] ** 2).mean(axis=1)) for rms in (one, other))
+    return np.asarray(np.maximum(a / b, b / a))
+
+
+def _law(spec: ControllerSpec) -> LearningLaw:
+    if spec.law is None:
+        raise InvalidInput(
+            f"controller '{spec.name}' does not learn in stance; choose one with a law, as 'ilc'"
+        )
+    return spec.law
+
+
+def _covered(spec: ControllerSpec) -> bool:
+    """Whether the law of the stance is all that a controller learns by."""
+    return spec.law is not None and spec.flight_law is None and spec.timing is None
+
+
+def _in_words(gain: float, memory: float, multiplier: float, less: float) -> str:
+    text = (
+        f"On a joint that moves slowly the law adds {gain:.2f} times the feedback torque and keeps "
+        f"{memory:.2f} of its memory, so that a stride multiplies the error's distance from its "
+        f"limit by {memory:.2f} (1 - {gain:.2f}) = {multiplier:.2f}"
+    )
+    if abs(multiplier) > 1.0 - 1e-3:
+        return text + ": it does not converge."
+    return text + f", and {less:.0%} of the error is gone in the limit."
+
+
+def _record(stride: xr.Dataset, model: LiftedModel) -> StrideRecord:
+    """The record of a stored stride, on the grid of the control."""
+    curves = {
+        name: stride[name].transpose("phase", "joint").interp(phase=phase_grid()).to_numpy()[None]
+        for name in ("error", "feedback", "feedforward")
+    }
+    gains = model.gains
+    rate = (curves["feedback"] - gains.proportional * curves["error"]) / gains.derivative
+    return StrideRecord.of(
+        curves["error"].astype(float),
+        rate.astype(float),
+        curves["feedback"].astype(float),
+        curves["feedforward"].astype(float),
+    )
+
+
+def _by_joint(error: Array) -> Array:
+    """RMS over the phase and the legs: (strides, samples, 12) becomes (strides, 3)."""
+    legs = error.reshape(*error.shape[:2], -1, len(JOINTS)).astype(float)
+    return np.asarray(np.sqrt((legs**2).mean(axis=(1, 2))))
+
+
+def _percent(value: float) -> str:
+    return f"{value:.1%}" if np.isfinite(value) else "-"

@@ -1,0 +1,172 @@
+"""Study of the initial feedforward: none, the model's, or the library's of other speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from ..._checks import reals
+from ..._typing import Array
+from ...control import ControllerSpec, Skill, TorqueLibrary, load_controller, model_feedforward
+from ...errors import InvalidInput
+from ...gait import Gait, load_library
+from ...robot import JOINTS, Robot, load_robot
+from ..metrics import STEADY_STRIDES, settling_stride
+from ..report import number
+from ..simulation import Schedule, Simulation
+from ..world import Scenario
+from .gain_reduction import NOTHING, simulate
+from .transfer import COMPARED, practise_library
+
+LEARNERS = ("ilc", "model+ilc", "library+ilc")
+"""The same laws, from nothing, from the model's feedforward, and from the torque library."""
+SHOWN = (0, 1, 2, 5, 10)
+"""Strides of learning in the table; 0 is the last one before."""
+_SCHEDULE = Schedule(0.5, 4.0, 16.0)
+_WORDS = {"none": "nothing", "model": "the model", "library": "the library"}
+
+
+def measure_seeding(
+    speeds: Sequence[float], scenario: Scenario, *, robot: str = "a1"
+) -> pd.DataFrame:
+    """Learn at the inner speeds from each initial feedforward; the library holds the others only.
+
+    Args:
+        speeds: Increasing speeds [m/s], three or more. The library is practised at all of them,
+            and each inner one begins with what its neighbours learned.
+        scenario: The world.
+        robot: Short name of the robot.
+
+    Returns:
+        A row for each controller of `LEARNERS`, speed and stride: `controller`, `speed`, `stride`
+        (of learning; 0 is the last before it), peak stance errors `thigh` and `calf`, means over
+        the legs [rad], and whether the robot stayed `upright`.
+
+    Raises:
+        InvalidInput: There are fewer than three speeds, or they do not increase.
+    """
+    speeds = reals("speeds", speeds)
+    if len(speeds) < 3:
+        raise InvalidInput("seeding needs three speeds or more: one between two that are practised")
+    if np.any(np.diff(speeds) <= 0.0):
+        raise InvalidInput("the speeds must increase; give each once, the lowest first")
+    machine, gaits_ = load_robot(robot), load_library(robot)
+    gaits = [gaits_.at(speed) for speed in speeds]
+    specs = [load_controller(name) for name in LEARNERS]
+    _, stored = practise_library(machine, gaits, specs[0], scenario)
+    tables = []
+    for spec in specs:
+        seed = _seed(spec, machine, gaits[1:-1], stored)
+        done = simulate(machine, gaits[1:-1], spec, scenario, _SCHEDULE, seed)
+        tables.append(_strides(spec, speeds[1:-1], done))
+    return pd.concat(tables, ignore_index=True)
+
+
+def settling(table: pd.DataFrame) -> pd.DataFrame:
+    """Count the strides of learning until thigh and calf have settled, by controller and speed.
+
+    All controllers have the same goal: a tenth or less missing of what learning from nothing takes
+    away. It is 0 where the seed alone is there, and NaN where a robot never stays there, or falls,
+    or where the one that learns from nothing does, so that there is no goal.
+
+    Args:
+        table: What `measure_seeding` returns.
+    """
+    found = []
+    for speed, rows in table.groupby("speed"):
+        curves = {name: _curves(rows, name) for name in LEARNERS}
+        nothing = curves[LEARNERS[0]]
+        final = nothing[-STEADY_STRIDES:].mean(axis=0)
+        for name, curve in curves.items():
+            fell = not rows[rows["controller"].isin([name, LEARNERS[0]])]["upright"].all()
+            counts = [
+                float("nan")
+                if fell
+                else settling_stride(curve[:, j], float(nothing[0, j]), float(final[j])) - 1.0
+                for j in range(len(COMPARED))
+            ]
+            found.append({"controller": name, "speed": speed, "strides": float(np.max(counts))})
+    return pd.DataFrame(found)
+
+
+def stayed_up(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the robots that did not fall."""
+    stood = table.groupby(["controller", "speed"])["upright"].transform("all")
+    return table[stood.astype(bool)]
+
+
+def describe_seeding(table: pd.DataFrame) -> str:
+    """Format medians over the speeds, with their range, for a terminal."""
+    strides, speeds = settling(table), table["speed"].nunique()
+    peaks = " ".join(f"{f'stride {k}':>9}" for k in SHOWN)
+    lines = [
+        f"median over {speeds} speed{'s' if speeds > 1 else ''}",
+        f"begins with   joint   peak [rad]: {peaks}   the end   strides to settle",
+    ]
+    for name in LEARNERS:
+        mine = table[table["controller"] == name]
+        fell = int((~mine.groupby("speed")["upright"].all()).sum())
+        mine, counts = stayed_up(mine), _of(strides, name)
+        took = _settled(counts) + (f", {fell} fell" if fell else "")
+        for joint in COMPARED:
+            medians = mine.groupby("stride")[joint].median()
+            values = " ".join(f"{number(medians.get(k, np.nan), '.4f'):>9}" for k in SHOWN)
+            end = f"{number(medians.iloc[-STEADY_STRIDES:].median(), '.4f'):>9}"
+            first = joint == COMPARED[0]
+            start = _WORDS[load_controller(name).source] if first else ""
+            line = f"{start:<12}  {joint:<20}{values} {end}"
+            lines.append(f"{line}   {took}" if first else line)
+    return "\n".join(lines)
+
+
+def _settled(counts: Array) -> str:
+    """Strides to settle of those that did, (n,) with NaN for the others."""
+    did = counts[np.isfinite(counts)]
+    if did.size == 0:
+        return "never"
+    text = f"{np.median(did):.0f} ({did.min():.0f} to {did.max():.0f})"
+    return text if did.size == counts.size else f"{text}, {did.size} of {counts.size}"
+
+
+def _seed(
+    spec: ControllerSpec, robot: Robot, gaits: Sequence[Gait], stored: TorqueLibrary
+) -> Skill:
+    if spec.source == "model":
+        return Skill(model_feedforward(robot, gaits))
+    if spec.source == "library":
+        return stored.left_out(np.array([gait.speed for gait in gaits]))[0]
+    return NOTHING
+
+
+def _strides(spec: ControllerSpec, speeds: Sequence[float], done: Simulation) -> pd.DataFrame:
+    log, rows = done.strides, []
+    first = np.argmax(log.scalars["learning"] == 1, axis=1)
+    length = int((log.count - first).min()) + 1  # as many of each robot
+    for k, speed in enumerate(speeds):
+        mine = slice(first[k] - 1, first[k] - 1 + length)
+        peaks = log.peak_error[k, mine]
+        legs = peaks.reshape(length, -1, len(JOINTS)).mean(axis=1)  # (length, 3)
+        rows.append(
+            pd.DataFrame(
+                {
+                    "controller": spec.name,
+                    "speed": speed,
+                    "stride": np.arange(length),
+                    **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
+                    "upright": log.scalars["upright"][k, mine] == 1,
+                }
+            )
+        )
+    return pd.concat(rows)
+
+
+def _curves(rows: pd.DataFrame, controller: str) -> Array:
+    """Peaks of one robot by stride, (strides, 2)."""
+    mine = rows[rows["controller"] == controller].sort_values("stride")
+    return np.asarray(mine[list(COMPARED)].to_numpy(), dtype=float)
+
+
+def _of(strides: pd.DataFrame, controller: str) -> Array:
+    return np.asarray(strides[strides["controller"] == controller]["strides"], dtype=float)

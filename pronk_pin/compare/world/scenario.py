@@ -1,0 +1,325 @@
+"""Scenarios: the true parameters of simulated worlds, which the model does not know.
+
+Scenarios go by name: `nominal`, `payload`, `payload=2+slope`, `ideal+delay`, `random-0-3`. A name
+is a world to begin with, and what is different in it, joined by `+`. Each mismatch has a value of
+its own, and takes another after `=`, in SI units. Without a world in front a mismatch is one of the
+nominal world. A cell of an experiment knows its scenario by name only, so a name says everything:
+the seed of a sampled world stands in it too.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from ..._checks import (
+    Interval,
+    file_name,
+    instance_of,
+    keep_reals,
+    keep_vectors,
+    none_or,
+    real,
+    text,
+    whole,
+)
+from ..._checks import seed as known_seed
+from ...errors import InvalidInput, UnknownName
+from ...storage import from_text
+from .mismatch import KNOWN, ROTOR
+from .sensors import Sensors
+
+Vector: TypeAlias = tuple[float, float, float]
+
+_NUMBERS = {
+    "armature": Interval(0, 1, "kg m^2"),
+    "damping": Interval(0, 50, "N m s/rad"),
+    "coulomb": Interval(0, 50, "N m"),
+    "torque_constant": Interval(0, 10, above=True),
+    "full_torque_speed": Interval(0, 1000, "rad/s"),
+    "delay": Interval(0, 0.2, "s"),
+    "payload": Interval(0, 100, "kg"),
+    "ground_time_constant": Interval(0, 1, "s", above=True),
+    "ground_friction": Interval(0, 10, above=True),
+    "slope": Interval(-0.5, 0.5, "rad"),  # the gaits are planned on level ground
+    "step_height": Interval(0, 0.5, "m"),
+    "step_length": Interval(0.05, 10, "m"),  # each step is a box in the world
+    "gravity": Interval(0, 30, "m/s^2", above=True),
+    "push_period": Interval(0, 3600, "s", above=True),
+    "push_duration": Interval(0, 60, "s", above=True),
+    "timestep": Interval(1e-5, 0.01, "s"),
+}
+"""What the numbers of a world for a robot of some tens of kilograms can be."""
+_VECTORS = {
+    "payload_position": Interval(-1, 1, "m"),
+    "com_shift": Interval(-0.5, 0.5, "m"),
+    "push_impulse": Interval(-200, 200, "N s"),
+}
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """The true parameters of a simulated world.
+
+    The robot is what its URDF or MJCF says; what the scenario adds comes on top of that.
+
+    A slope is played as gravity that leans back, so that the ground's frame stays the world's: x
+    goes up the slope, z stands on it, and a locked trunk stays parallel to it.
+
+    Attributes:
+        name: Short name, as on the command line.
+        armature: Rotor inertia as the joint feels it, through the gear, added [kg m^2].
+        damping: Viscous friction in the joints, added [N m s/rad].
+        coulomb: Coulomb friction in the joints, added [N m].
+        torque_constant: Torque that a motor gives, over the torque it is asked for.
+        full_torque_speed: Joint speed up to which a motor gives its greatest torque [rad/s].
+        no_load_speed: Joint speed at which it gives none any more, falling linearly [rad/s]; None
+            where speed does not matter.
+        delay: Time from a command to its torque [s], a whole number of time steps.
+        payload: Mass fixed to the trunk [kg].
+        payload_position: Where the payload sits, in the trunk's frame [m].
+        com_shift: Shift of the trunk's centre of mass, its mass and inertia kept [m].
+        sensors: How far the sensors are from the truth.
+        ground_time_constant: Time constant of the contact [s], MuJoCo's solref; larger is softer.
+        ground_friction: Friction coefficient between foot and ground.
+        slope: Slope of the ground, uphill in x where positive [rad].
+        step_height: Greatest height of the steps across the way [m].
+        step_length: Length of a step along the way [m].
+        gravity: Gravitational acceleration [m/s^2].
+        push_impulse: Impulse of a push on the trunk's centre of mass, turned around from push to
+            push [N s].
+        push_period: Time between pushes; the first comes after so long, start-up included [s].
+        push_duration: How long a push lasts [s].
+        seed: Draws the heights of the steps.
+        timestep: Time step of the simulation and of the control [s].
+        mjcf: Path of an MJCF that stands in for the robot's own URDF; empty for the URDF.
+    """
+
+    name: str
+    armature: float = 0.0
+    damping: float = 0.0
+    coulomb: float = 0.0
+    torque_constant: float = 1.0
+    full_torque_speed: float = 0.0
+    no_load_speed: float | None = None
+    delay: float = 0.0
+    payload: float = 0.0
+    payload_position: Vector = (0.0, 0.0, 0.06)
+    com_shift: Vector = (0.0, 0.0, 0.0)
+    sensors: Sensors = field(default_factory=Sensors)
+    ground_time_constant: float = 0.002
+    ground_friction: float = 0.8
+    slope: float = 0.0
+    step_height: float = 0.0
+    step_length: float = 0.3
+    gravity: float = 9.81
+    push_impulse: Vector = (0.0, 0.0, 0.0)
+    push_period: float = 4.1
+    push_duration: float = 0.05
+    seed: int = 0
+    timestep: float = 0.001
+    mjcf: str = ""
+
+    def __post_init__(self) -> None:
+        file_name("name of a scenario", self.name)
+        prefix = f"scenario '{self.name}': "
+        keep_reals(self, _NUMBERS, prefix)
+        keep_vectors(self, _VECTORS, prefix=prefix)
+        speeds = Interval(0, 1000, "rad/s", above=True)
+        no_load = none_or(real, f"{prefix}no_load_speed", self.no_load_speed, speeds)
+        object.__setattr__(self, "no_load_speed", no_load)
+        object.__setattr__(self, "seed", known_seed(f"{prefix}seed", self.seed))
+        instance_of(f"{prefix}sensors", self.sensors, Sensors)
+        text(f"{prefix}mjcf", self.mjcf)
+        self._check_ground()
+        self._check_motors()
+        if not self.push_duration < self.push_period:
+            raise self._wrong("push_duration must be shorter than push_period")
+
+    def to_json(self) -> str:
+        """The scenario as JSON; `from_json` reads it."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Scenario:
+        """Read the scenario that `to_json` wrote.
+
+        Raises:
+            InvalidInput: The text is something else.
+        """
+        return from_text(text, cls, "a scenario", "make the strides again")
+
+    def _check_ground(self) -> None:
+        if not self.ground_time_constant >= 2 * self.timestep:
+            raise self._wrong(
+                f"a ground_time_constant below two time steps ({2 * self.timestep:g} s) is "
+                "unstable; make it larger"
+            )
+        if not self.step_height <= 0.5 * self.step_length:
+            raise self._wrong("steps are at most half as high as they are long")
+
+    def _check_motors(self) -> None:
+        no_load = math.inf if self.no_load_speed is None else self.no_load_speed
+        if not self.full_torque_speed < no_load:
+            raise self._wrong("full_torque_speed must be less than no_load_speed")
+        steps = self.delay / self.timestep
+        if not abs(steps - round(steps)) < 1e-6:
+            raise self._wrong(
+                f"delay must be a whole number of time steps of {self.timestep:g} s; "
+                f"{round(steps) * self.timestep:g} s is the nearest"
+            )
+
+    def _wrong(self, reason: str) -> InvalidInput:
+        return InvalidInput(f"scenario '{self.name}': {reason}")
+
+    @property
+    def affine(self) -> bool:
+        """Whether servos can play a whole phase at once, with `World.play`: nothing comes between
+        the tape and the torque but what is affine in the joints' angles and velocities."""
+        return self.delay == 0.0 and self.foreseeable
+
+    @property
+    def foreseeable(self) -> bool:
+        """Whether the motors give what they were told, and what they are told follows from the
+        state alone: with a delay, the torques of as many ticks are then known beforehand."""
+        return self.no_load_speed is None and self.sensors.perfect
+
+    @property
+    def pushes(self) -> bool:
+        """Whether the robots are pushed."""
+        return any(self.push_impulse)
+
+    @property
+    def delay_ticks(self) -> int:
+        """The delay in time steps."""
+        return round(self.delay / self.timestep)
+
+    @property
+    def gravity_vector(self) -> Vector:
+        """Gravity in the world's frame [m/s^2], which the slope turns."""
+        return (-self.gravity * math.sin(self.slope), 0.0, -self.gravity * math.cos(self.slope))
+
+
+WORLDS = {
+    scenario.name: scenario
+    for scenario in (
+        Scenario("ideal"),
+        Scenario("nominal", armature=ROTOR, damping=0.1, coulomb=0.2),
+    )
+}
+"""Worlds to begin with: what the robot's own description says, and with what URDFs leave out."""
+
+_SAMPLED = re.compile(r"random-(\d{1,9})-(\d{1,9})")
+
+
+def load_scenario(name: str, *, mjcf: str = "") -> Scenario:
+    """The scenario of that name; it bears the name in its shortest form.
+
+    Args:
+        name: As above: `payload`, `nominal+payload=2+slope`, `ideal`, `random-0-3+delay`.
+        mjcf: Path of an MJCF that stands in for the robot's URDF.
+
+    Raises:
+        UnknownName: A part of it is not known.
+        InvalidInput: A value is out of range, or two parts change the same thing.
+    """
+    first, *rest = text("scenario", name).split("+")
+    scenario = _world(first)
+    if scenario is None:
+        scenario, rest = WORLDS["nominal"], [first, *rest]
+    values = _values(name, rest)
+    changes: dict[str, Any] = {}
+    for part, value in values.items():
+        try:
+            changed_by = KNOWN[part].changes(value)
+        except InvalidInput as error:
+            raise InvalidInput(f"scenario '{name}': {error}") from error
+        for attribute, changed in changed_by.items():
+            if attribute in changes:
+                raise InvalidInput(
+                    f"scenario '{name}': two parts of it change {attribute}; keep one of them"
+                )
+            changes[attribute] = changed
+    world = [] if values and scenario.name == "nominal" else [scenario.name]
+    short = "+".join([*world, *(_written(part, value) for part, value in values.items())])
+    return replace(scenario, **changes, name=short, mjcf=mjcf)
+
+
+def _world(name: str) -> Scenario | None:
+    sampled = _SAMPLED.fullmatch(name)
+    if sampled:
+        return _sample(*map(int, sampled.groups()))
+    return WORLDS.get(name)
+
+
+def _values(name: str, parts: list[str]) -> dict[str, float]:
+    """The values of the mismatches in a name, in the order of `KNOWN`."""
+    values: dict[str, float] = {}
+    for part in parts:
+        if _world(part) is not None:
+            raise InvalidInput(f"scenario '{name}': a world, as {part}, comes first in a name")
+        mismatch, equals, number = part.partition("=")
+        if mismatch not in KNOWN:
+            raise UnknownName("scenario", part, (*WORLDS, *KNOWN, "random-SEED-INDEX"))
+        if mismatch in values:
+            raise InvalidInput(f"scenario '{name}': {mismatch} is in it twice; keep one of them")
+        try:
+            values[mismatch] = float(number) if equals else KNOWN[mismatch].value
+        except ValueError:
+            values[mismatch] = math.nan
+        if not math.isfinite(values[mismatch]):
+            raise InvalidInput(
+                f"scenario '{name}': '{part}' needs a number after '=', in "
+                f"{KNOWN[mismatch].unit}, as in {mismatch}={KNOWN[mismatch].value:g}"
+            )
+    return {part: values[part] for part in KNOWN if part in values}
+
+
+def _written(part: str, value: float) -> str:
+    number = repr(value).removesuffix(".0").replace("e+", "e")  # a plus would join
+    return part if value == KNOWN[part].value else f"{part}={number}"
+
+
+def random_scenarios(n: int, seed: int) -> tuple[Scenario, ...]:
+    """Sampled worlds: everything that the model alone expresses is off at once, within reason.
+
+    Args:
+        n: How many.
+        seed: Of the family. The i-th is `random-<seed>-<i>`, whatever n is.
+
+    Raises:
+        InvalidInput: n is below 1, or the seed is negative.
+    """
+    n = whole("n", n, Interval(1, 1_000_000))
+    seed = whole("seed", seed, Interval(0, 999_999_999))  # nine digits, as in a name
+    return tuple(_sample(seed, index) for index in range(n))
+
+
+def _sample(seed: int, index: int) -> Scenario:
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
+
+    def draw(low: float, high: float) -> float:
+        return float(rng.uniform(low, high))
+
+    return Scenario(
+        f"random-{seed}-{index}",
+        armature=draw(0.6, 1.8) * ROTOR,
+        damping=draw(0.02, 0.4),
+        coulomb=draw(0.05, 0.5),
+        torque_constant=draw(0.85, 1.05),
+        payload=draw(0.0, 3.0),
+        payload_position=(draw(-0.1, 0.1), draw(-0.03, 0.03), draw(0.03, 0.1)),
+        com_shift=(draw(-0.02, 0.02), draw(-0.01, 0.01), draw(-0.01, 0.01)),
+        ground_time_constant=0.002 * 4.0 ** draw(0.0, 1.0),
+        ground_friction=draw(0.5, 1.0),
+        slope=draw(-0.06, 0.06),
+    )
+
+
+SCENARIOS = {name: load_scenario(name) for name in (*WORLDS, *KNOWN)}
+"""The worlds to begin with, and each mismatch alone."""

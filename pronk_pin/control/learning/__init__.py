@@ -1,0 +1,42 @@
+"""What answers after a stride: laws from one stride's record to the next one's feedforward.
+
+Comes in: a `StrideRecord`, and a `LiftedModel` for laws that need one.
+Goes out: the next stride's feedforward, and torque libraries of what was learned.
+"""
+
+from .laws import (
+    SKIPPED,
+    CurrentIterationILC,
+    LearningLaw,
+    PaperILC,
+    PDTypeILC,
+    StrideSelection,
+    anti_windup,
+    given,
+    known_law,
+    learned_by,
+)
+from .lifted import LiftedModel
+from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
+from .symmetry import symmetric
+from .torque_library import Skill, TorqueLibrary
+
+__all__ = [
+    "SKIPPED",
+    "CurrentIterationILC",
+    "LearningLaw",
+    "LiftedModel",
+    "ModelBasedILC",
+    "NormOptimalILC",
+    "PDTypeILC",
+    "PaperILC",
+    "PlantInversionILC",
+    "Skill",
+    "StrideSelection",
+    "TorqueLibrary",
+    "anti_windup",
+    "given",
+    "known_law",
+    "learned_by",
+    "symmetric",
+]

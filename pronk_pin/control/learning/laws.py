@@ -1,0 +1,264 @@
+"""Iterative learning laws: from the record of a stride to the feedforward of the next.
+
+A law is a function with parameters and no state: what was learned so far is in the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from ..._checks import SHARE, Interval, instance_of, keep_reals, shown
+from ..._typing import Array, BoolArray, IntArray
+from ...errors import InvalidInput
+from ..signals import PAPER_A, PAPER_B, Gains, StrideRecord, ZeroPhaseFilter, look_ahead
+
+
+class LearningLaw(Protocol):
+    """A learning law `u_{k+1} = L(record_k)`: from a stride's record to the next feedforward."""
+
+    def update(self, record: StrideRecord) -> Array:
+        """Compute the next stride's feedforward on the phase grid [N m], shape (n, samples, 12)."""
+        ...
+
+
+SKIPPED = (
+    *("", "not finite", "fallen", "too short", "too long", "duration unknown"),
+    *("false touchdown", "contact lost", "tilted"),
+)
+"""Reasons for which a stride is not learned from; the first stands for none."""
+
+
+@dataclass(frozen=True)
+class StrideSelection:
+    """Criteria for strides to learn from: finite, upright, and of about the right length.
+
+    Attributes:
+        shortest: Shortest stride, over the reference's duration.
+        longest: Longest one.
+        tilt: Largest angle between trunk and gait [rad]: where a trunk that is free to turn is
+            further off, its attitude comes first.
+    """
+
+    shortest: float = 0.7
+    longest: float = 1.4
+    tilt: float = 0.15
+
+    def __post_init__(self) -> None:
+        checks = {
+            "shortest": Interval(0, 1),
+            "longest": Interval(1, 100),
+            "tilt": Interval(0, np.pi, "rad"),
+        }
+        keep_reals(self, checks, "stride selection: ")
+
+    def skipped(self, record: StrideRecord) -> IntArray:
+        """Reasons for which strides are not learned from, as indices into `SKIPPED`, shape (n,)."""
+        parts = (record.error, record.error_rate, record.feedback, record.feedforward)
+        finite = np.all([np.isfinite(part).all(axis=(1, 2)) for part in parts], axis=0)
+        duration = record.relative_duration
+        checks = [
+            ~finite,
+            ~record.upright,
+            duration < self.shortest,
+            duration > self.longest,
+            np.isnan(duration),
+        ]
+        return np.asarray(np.select(checks, range(1, len(checks) + 1), default=0), dtype=np.intp)
+
+    def usable(self, record: StrideRecord) -> BoolArray:
+        """Whether strides may be learned from, shape (n,)."""
+        return np.asarray(self.skipped(record) == 0)
+
+
+def given(record: StrideRecord) -> StrideRecord:
+    """The record with the torques that the motors delivered; saturation cuts the feedback first.
+
+    The paper's law stores the recorded torque; what the motors could not give is not in it.
+    """
+    feedback = record.feedback
+    cut = np.clip(record.missing, -np.abs(feedback), np.abs(feedback))
+    cut = np.where(cut * feedback < 0.0, cut, 0.0)
+    feedforward_cut = record.missing - cut
+    return replace(
+        record, feedback=feedback + cut, feedforward=record.feedforward + feedforward_cut
+    )
+
+
+def anti_windup(learned: Array, record: StrideRecord, tau_max: Array) -> Array:
+    """Limit the next feedforward [N m] to what the motors can deliver.
+
+    Where they were at their limit in the last stride, nothing is added in that direction; and the
+    memory never holds more than the limit.
+
+    Args:
+        learned: Feedforward of the law, shape (n, samples, 12).
+        record: Record that it was learned from.
+        tau_max: The motors' limits [N m], shape (12,).
+    """
+    before = record.feedforward
+    further = (learned - before) * record.missing < -_CUT
+    return np.clip(np.where(further, before, learned), -tau_max, tau_max)
+
+
+_CUT = 1e-9
+"""Product of torques [(N m)^2] below which a motor did not cut anything off."""
+
+
+_GAIN = Interval(0, 2, below=True)
+_DELTA = Interval(0, 1, below=True)
+
+
+def _check_parts(law: str, owner: PDTypeILC | PaperILC | CurrentIterationILC) -> None:
+    """The gains and the filter of a law."""
+    if not isinstance(owner, CurrentIterationILC):
+        instance_of(f"{law}: gains", owner.gains, Gains)
+    if not callable(owner.filter):
+        raise InvalidInput(
+            f"{law}: filter={shown(owner.filter)} is no filter; give a ZeroPhaseFilter, or a "
+            "function of an array (n, samples, 12)"
+        )
+
+
+def known_law(name: str, law: object) -> LearningLaw | None:
+    """A learning law, or None.
+
+    Raises:
+        InvalidInput: It is neither.
+    """
+    # Dictionaries and sets have an `update` too.
+    other = isinstance(law, type | Mapping | set) or not callable(getattr(law, "update", None))
+    if law is not None and other:
+        raise InvalidInput(
+            f"{name}={shown(law)} is no learning law; give an object with update(record), such as "
+            "PDTypeILC(), or None"
+        )
+    return law  # type: ignore[return-value]
+
+
+def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array:
+    """What a law makes of a stride's record [N m], shape (n, samples, 12).
+
+    Raises:
+        InvalidInput: It answers something else, or what is not finite.
+    """
+    answer, wanted = law.update(record), record.feedforward.shape
+    name = f"the law {type(law).__name__} of controller '{controller}'"
+    if not isinstance(answer, np.ndarray) or answer.shape != wanted:
+        shape = getattr(answer, "shape", None)
+        what = shown(answer) if shape is None else f"an array of shape {shape}"
+        raise InvalidInput(
+            f"{name} answered {what} where {wanted} is expected; let its update(record) return an "
+            "array of the shape of record.feedforward"
+        )
+    if answer.dtype.kind not in "iuf" or not np.isfinite(answer).all():
+        raise InvalidInput(
+            f"{name} answered torques that are not finite numbers; let its update(record) return "
+            "finite ones, as record.error and record.feedforward are"
+        )
+    return answer
+
+
+@dataclass(frozen=True)
+class PDTypeILC:
+    """PD-type ILC on a memory that holds the feedforward only, with forgetting.
+
+    `ff <- Q[(1 - leak) ff + gain (Kp e + Kd e')(s + delta)]`
+
+    Unlike the paper's law its memory holds no feedback torque, so that its learning gain is `gain`
+    and not `1 + gain`.
+
+    Attributes:
+        gain: Learning gain; 0 to 1.
+        leak: Part of the memory that is forgotten in each stride.
+        delta: Look-ahead in phase; what the feedforward does takes a while to show in the error.
+        gains: Weights of the error and its rate: eq. (10).
+        filter: The learning filter Q.
+    """
+
+    gain: float = 0.5
+    leak: float = 0.03
+    delta: float = 0.06
+    gains: Gains = field(default_factory=Gains)
+    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.08))
+
+    def __post_init__(self) -> None:
+        keep_reals(self, {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}, "a PD-type law: ")
+        _check_parts("a PD-type law", self)
+
+    def update(self, record: StrideRecord) -> Array:
+        """See `LearningLaw.update`."""
+        correction = _weighted_error(record, self.gains, self.delta)
+        return self.filter((1.0 - self.leak) * record.feedforward + self.gain * correction)
+
+
+@dataclass(frozen=True)
+class PaperILC:
+    """The paper's law: eq. (10), on the recorded total torque, with the printed filter.
+
+    `ff <- Q[tau + (Kp e + Kd e')(s + delta)]` with `tau = ff + tau_b`, the recorded torque.
+
+    The recorded torque already holds the feedback of the last stride, so the total learning gain
+    is 2; only the filter's leak keeps the law from diverging.
+
+    Attributes:
+        delta: Look-ahead in phase.
+        gains: Feedforward gains, in the paper equal to the feedback gains.
+        filter: Zero-phase filter over recorded torques and errors.
+    """
+
+    delta: float = 0.06
+    gains: Gains = field(default_factory=Gains)
+    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter(PAPER_B, PAPER_A))
+
+    def __post_init__(self) -> None:
+        keep_reals(self, {"delta": _DELTA}, "the paper's law: ")
+        _check_parts("the paper's law", self)
+
+    def update(self, record: StrideRecord) -> Array:
+        """See `LearningLaw.update`."""
+        torque = record.feedforward + record.feedback
+        return self.filter(torque + _weighted_error(record, self.gains, self.delta))
+
+
+@dataclass(frozen=True)
+class CurrentIterationILC:
+    """Current-iteration law: the feedback that acted in the stride becomes memory.
+
+    `ff <- Q[(1 - leak) ff + gain tau_b(s + delta)]`
+
+    The textbook's form is `u_k = w_k + C e_k` with `w_{k+1} = Q u_k`: the feedback of the present
+    stride is part of the trial, and what it did is learned. No model and no second set of gains;
+    also known as feedback-error learning.
+
+    Attributes:
+        gain: Part of the feedback torque that is taken over; 1 in the textbook.
+        leak: Part of the memory that is forgotten in each stride.
+        delta: Look-ahead in phase.
+        filter: The learning filter Q.
+    """
+
+    gain: float = 0.5
+    leak: float = 0.005
+    delta: float = 0.05
+    filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.04))
+
+    def __post_init__(self) -> None:
+        checks = {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}
+        keep_reals(self, checks, "a current-iteration law: ")
+        _check_parts("a current-iteration law", self)
+
+    def update(self, record: StrideRecord) -> Array:
+        """See `LearningLaw.update`."""
+        feedback = look_ahead(record.feedback, self.delta)
+        return self.filter((1.0 - self.leak) * record.feedforward + self.gain * feedback)
+
+
+def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:
+    """Kp e(s + delta) + Kd e'(s + delta) [N m], shape (n, samples, 12)."""
+    error = look_ahead(record.error, delta, record.error_onward)
+    rate = look_ahead(record.error_rate, delta, record.rate_onward)
+    return gains.proportional * error + gains.derivative * rate

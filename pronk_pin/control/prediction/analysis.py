@@ -1,0 +1,236 @@
+"""Convergence analysis of learning laws along a gait, by linear algebra and without a simulation.
+
+A law and the lifted model together are one affine iteration of the feedforward u and the state x at
+touchdown, `z_{k+1} = T z_k + c`. Its operator is found by asking the law itself, so that any law
+that is affine in the record can be analysed. Terms follow Bristow, Tharayil and Alleyne 2006.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse.linalg
+
+from ..._typing import Array
+from ...robot import NL
+from ..learning import LearningLaw, LiftedModel
+from ..signals import StrideRecord
+
+GAIN_ERRORS = (0.7, 1.3)
+"""Strengths of the motors, over the model's, for which stability is asked."""
+DELAYS = (2, 5, 10)
+"""Delays of the feedforward, in samples of the phase grid, for which stability is asked."""
+_POWERS = 7
+
+
+class QuasiStatic(NamedTuple):
+    """The law on a quasi-static joint, which needs the torque d and rests at `Kp e = d - ff`.
+
+    There the law is `ff <- memory (ff + gain Kp e)`, so that the error obeys
+    `e_{k+1} - e_inf = memory (1 - gain) (e_k - e_inf)` and
+    `e_inf = (1 - memory) / (1 - memory (1 - gain)) e_0`.
+    """
+
+    memory: float
+    """Share of a constant feedforward that is kept: the DC gain of the filter, less the leak."""
+    gain: float
+    """Total learning gain: feedback torque added to the memory, before the filter."""
+
+    @property
+    def multiplier(self) -> float:
+        """Factor that a stride puts on the error's distance from its limit; stable within 1."""
+        return self.memory * (1.0 - self.gain)
+
+    @property
+    def left(self) -> float:
+        """Share of the error that remains in the limit."""
+        return (1.0 - self.memory) / (1.0 - self.multiplier)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Stability, transient growth, limit and robustness of a law along a gait, by the model.
+
+    Attributes:
+        quasi_static: The law alone, on a joint that moves slowly.
+        radius: Spectral radius of the iteration: below 1 it is stable.
+        stride_radius: The same with every stride beginning in the same state, as textbooks have it.
+        largest_gain: Largest singular value of the textbook's iteration of the feedforward: below 1
+            it comes closer to its limit with every stride.
+        transient: Largest norm that powers of the iteration reach, feedforward to feedforward.
+        limit: RMS of the error in the limit over that at the beginning, of hip, thigh and calf;
+            NaN where the iteration is unstable.
+        with_gain_error: Spectral radius by the strength of the motors over the model's.
+        with_delay: Spectral radius by the delay of the feedforward [samples of the phase grid].
+    """
+
+    quasi_static: QuasiStatic
+    radius: float
+    stride_radius: float
+    largest_gain: float
+    transient: float
+    limit: Array
+    with_gain_error: dict[float, float]
+    with_delay: dict[int, float]
+
+
+def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = None) -> Analysis:
+    """Analyse the iteration of a law along a gait: stability, limit and robustness.
+
+    Only what is the same on the left and on the right is looked at, since pronking is; and a law's
+    treatment of strides is assumed affine, which limits of the motors are not.
+
+    Args:
+        law: The law; one that needs a model has been given it.
+        model: The lifted model of the gait.
+        begin: The stride at which the learning begins; `model.planned` by default.
+    """
+    begin = model.planned if begin is None else begin
+    basis = symmetric_basis(*model.shape)
+    operator = iteration(law, model, basis)
+    size = basis.shape[1]
+    within_stride = iteration(law, model.within_a_stride, basis)
+    radius = _radius(operator)
+    limit = np.full(3, np.nan)
+    if radius < 1.0:
+        limit = _by_joint(_limit(law, model, begin, operator, basis)) / _by_joint(begin.error)
+    return Analysis(
+        quasi_static=quasi_static(law, model),
+        radius=radius,
+        stride_radius=_radius(within_stride),
+        largest_gain=_norm(within_stride),
+        transient=_transient(operator, size),
+        limit=limit,
+        with_gain_error={
+            factor: _radius(iteration(law, model.scaled(factor), basis)) for factor in GAIN_ERRORS
+        },
+        with_delay={
+            delay: _radius(iteration(law, model.delayed(delay), basis)) for delay in DELAYS
+        },
+    )
+
+
+def predict(law: LearningLaw, model: LiftedModel, begin: StrideRecord, strides: int) -> Array:
+    """Predict the errors of the strides of learning by the lifted model [rad].
+
+    Args:
+        law: The law.
+        model: The lifted model of the gait.
+        begin: The last stride before learning, of one robot.
+        strides: How many strides of learning.
+
+    Returns:
+        Shape (strides + 1, samples, joints), the first that of `begin`.
+    """
+    errors, record, state = [begin.error[0]], begin, np.zeros((1, len(model.carry)))
+    for _ in range(strides):
+        feedforward = law.update(record)
+        state = model.land(record.feedforward, begin, state)
+        record = model.stride(feedforward, begin, state)
+        errors.append(record.error[0])
+    return np.array(errors)
+
+
+def quasi_static(law: LearningLaw, model: LiftedModel) -> QuasiStatic:
+    """Memory and gain of the law for constant records, at mid-stance and for the calf."""
+    shape = (1, *model.shape)
+    none, ones = np.zeros(shape), np.ones(shape)
+    stiffness = model.gains.proportional[: shape[2]]
+    middle = (0, shape[1] // 2, shape[2] - 1)
+    memory = float(law.update(StrideRecord.of(none, none, none, ones))[middle])
+    added = float(law.update(StrideRecord.of(ones / stiffness, none, ones, none))[middle])
+    return QuasiStatic(memory, added / memory if memory != 0.0 else np.inf)
+
+
+def iteration(law: LearningLaw, model: LiftedModel, basis: Array) -> Array:
+    """Matrix T of the iteration `z_{k+1} = T z_k + c` of z = (u, x), u in an orthonormal basis.
+
+    One column at a time the law is asked for its answer to a unit of u or x, less that to zero.
+
+    Args:
+        law: The law.
+        model: The lifted model.
+        basis: Columns that span the feedforwards, shape (samples * joints, m).
+
+    Returns:
+        Shape (m + states, m + states).
+    """
+    size, states = basis.shape[1], len(model.carry)
+    none = model.record(*np.zeros((3, basis.shape[0])))
+    learned_from_none = law.update(none).reshape(1, -1)
+    columns = []
+    for z in np.array_split(np.eye(size + states), max(1, (size + states) // 128)):
+        feedforward = (z[:, :size] @ basis.T).reshape(-1, *model.shape)
+        record = model.stride(feedforward, none, z[:, size:])
+        learned = law.update(_all_of_robot_0(record)).reshape(len(z), -1) - learned_from_none
+        landed = model.land(feedforward, none, z[:, size:])
+        columns.append(np.hstack([learned @ basis, landed]))
+    return np.asarray(np.vstack(columns).T, dtype=float)
+
+
+def symmetric_basis(samples: int, joints: int) -> Array:
+    """Orthonormal basis of the left-right symmetric feedforwards, shape (samples * joints, m).
+
+    Hips turn in opposite senses. For other robots than ours, with 12 joints, every feedforward.
+    """
+    if joints != NL:
+        return np.eye(samples * joints)
+    sides = np.zeros((NL, NL // 2))
+    for pair in range(2):  # front, rear
+        for joint, sign in enumerate((-1.0, 1.0, 1.0)):
+            column = 3 * pair + joint
+            sides[6 * pair + joint, column] = np.sqrt(0.5)
+            sides[6 * pair + 3 + joint, column] = sign * np.sqrt(0.5)
+    return np.asarray(np.kron(np.eye(samples), sides))
+
+
+def _all_of_robot_0(record: StrideRecord) -> StrideRecord:
+    record.robot[:] = 0
+    return record
+
+
+def _limit(
+    law: LearningLaw, model: LiftedModel, begin: StrideRecord, operator: Array, basis: Array
+) -> Array:
+    """Errors at the fixed point `z = (1 - T)^-1 c` of the iteration, (samples, joints)."""
+    start = np.concatenate([basis.T @ begin.feedforward.reshape(-1), np.zeros(len(model.carry))])
+    updated = basis.T @ law.update(begin).reshape(-1)
+    change = np.concatenate([updated, np.zeros(len(model.carry))]) - start
+    z = np.linalg.solve(np.eye(len(operator)) - operator, change)  # from the beginning on
+    size = basis.shape[1]
+    feedforward = begin.feedforward + (basis @ z[:size]).reshape(begin.feedforward.shape)
+    return np.asarray(model.stride(feedforward, begin, z[None, size:]).error)
+
+
+def _by_joint(error: Array) -> Array:
+    """RMS over the stance and the legs, of hip, thigh and calf."""
+    square = (error.reshape(-1, error.shape[-1]) ** 2).mean(axis=0)
+    return np.asarray(
+        np.sqrt(square.reshape(-1, 3).mean(axis=0) if square.size % 3 == 0 else square)
+    )
+
+
+def _radius(operator: Array) -> float:
+    if len(operator) < 200:
+        return float(np.abs(np.linalg.eigvals(operator)).max())
+    start = np.random.default_rng(0).standard_normal(len(operator))
+    largest = scipy.sparse.linalg.eigs(
+        operator, k=4, ncv=60, v0=start, tol=1e-6, return_eigenvectors=False, maxiter=2000
+    )
+    return float(np.abs(largest).max())
+
+
+def _norm(operator: Array) -> float:
+    return float(np.sqrt(scipy.linalg.eigvalsh(operator.T @ operator)[-1]))
+
+
+def _transient(operator: Array, size: int) -> float:
+    """Largest 2-norm of the powers 1, 2, 4, ... 64 of the operator, from u to u."""
+    largest, power = 0.0, operator
+    for _ in range(_POWERS):
+        largest = max(largest, _norm(power[:size, :size]))
+        power = power @ power
+    return largest

@@ -1,0 +1,34 @@
+"""What goes to and fro between controller and robot: tapes, records, references.
+
+Comes in: gaits, and what was measured at every tick.
+Goes out: `Tape`, `StrideRecord`, filtered signals, and detected contacts.
+"""
+
+from .contact_detection import ContactDetector, StanceContact, TouchdownDetector
+from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, first_order, look_ahead
+from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
+from .reference import FlightTiming, Reference
+from .tape import Gains, Tape, clip_torque
+
+__all__ = [
+    "PAPER_A",
+    "PAPER_B",
+    "PARTS",
+    "SAMPLES",
+    "ContactDetector",
+    "FlightTiming",
+    "Gains",
+    "PhaseLog",
+    "Reference",
+    "StanceContact",
+    "StrideRecord",
+    "Tape",
+    "TouchdownDetector",
+    "ZeroPhaseFilter",
+    "clip_torque",
+    "first_order",
+    "held",
+    "look_ahead",
+    "phase_grid",
+    "resample",
+]

@@ -1,0 +1,105 @@
+"""Joint references of gaits, tick by tick, and the adaptation of the flight's duration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._checks import SHARE, Interval, keep_reals
+from ..._typing import Array, IntArray
+from ...gait import GaitPhase
+
+_NOTICED = 2e-5
+"""Change of a duration [s] below which a reference stays unchanged."""
+
+
+@dataclass(frozen=True)
+class FlightTiming:
+    """Adaptation of the duration of the flight's reference to that of the last flights.
+
+    `T_{k+1} = T_k + gain (T_measured - T_k)`, within `limit` of the planned duration.
+
+    The legs swing at 20 rad/s when they touch down. A flight that lasts 5 ms longer than planned
+    (motors that act late push for longer) ends 0.1 rad from the posture in which the stance begins,
+    however well it was tracked; and no torque learned in stance makes up for that.
+
+    Attributes:
+        gain: Part of the difference that is taken over in a stride; 0 to 1.
+        limit: Largest relative change of the planned duration.
+    """
+
+    gain: float = 0.5
+    limit: float = 0.15
+
+    def __post_init__(self) -> None:
+        checks = {"gain": SHARE, "limit": Interval(0, 1, below=True)}
+        keep_reals(self, checks, "a flight's timing: ")
+
+    def next(self, duration: Array, measured: Array, planned: Array) -> Array:
+        """Compute the next reference's duration from the last, the measured and the planned [s]."""
+        following = duration + self.gain * (measured - duration)
+        return np.clip(following, (1.0 - self.limit) * planned, (1.0 + self.limit) * planned)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Joint references of n gaits in one part of the stride, at each tick.
+
+    Attributes:
+        parts: That part of each gait.
+        timestep: Length of a tick [s].
+        planned: Planned durations [s], shape (n,).
+        duration: Durations that the reference is stretched to [s], shape (n,).
+        ticks: Ticks after which the part ends at the latest, shape (n,).
+        phase: Phase s at each tick, held at 1, shape (n, ticks).
+        position: Joint angles [rad], shape (n, ticks, 12).
+        velocity: Joint velocities [rad/s], zero where the phase is held, shape (n, ticks, 12).
+    """
+
+    parts: tuple[GaitPhase, ...]
+    timestep: float
+    planned: Array
+    duration: Array
+    ticks: IntArray
+    phase: Array
+    position: Array
+    velocity: Array
+
+    @classmethod
+    def of(cls, parts: Sequence[GaitPhase], timestep: float, latest: float) -> Reference:
+        """Tabulate one part of each gait, for up to `latest` times its planned duration."""
+        planned = np.array([part.duration for part in parts])
+        ticks = np.round(latest * planned / timestep).astype(np.intp)
+        shape = (len(parts), int(ticks.max()))
+        joints = parts[0].joint_reference(np.zeros(1))[0].shape[1]
+        curves = (np.empty((*shape, joints)) for _ in range(2))
+        reference = cls(
+            tuple(parts), timestep, planned, planned.copy(), ticks, np.empty(shape), *curves
+        )
+        reference._tabulate(np.arange(len(parts)))
+        return reference
+
+    def stretch(self, rows: IntArray, duration: Array) -> None:
+        """Stretch the references of some robots to durations (m,) [s]; postures stay the same."""
+        noticed = np.abs(duration - self.duration[rows]) > _NOTICED
+        self.duration[rows[noticed]] = duration[noticed]
+        self._tabulate(rows[noticed])
+
+    def _tabulate(self, rows: IntArray) -> None:
+        for row, end in zip(rows, self.ends(rows), strict=True):
+            part, duration = self.parts[row], self.duration[row]
+            s = np.minimum(np.arange(end) * self.timestep / duration, 1.0)
+            position, velocity = part.joint_reference(s)
+            velocity[s >= 1.0] = 0.0
+            # Past its end a flight holds the posture of touchdown.
+            self.phase[row, :end], self.phase[row, end:] = s, s[-1]
+            self.position[row, :end], self.position[row, end:] = position, position[-1]
+            self.velocity[row, :end] = velocity * (part.duration / duration)
+            self.velocity[row, end:] = 0.0
+
+    def ends(self, rows: IntArray) -> IntArray:
+        """Ticks after which the references of some robots are constant, shape (m,)."""
+        ends = np.ceil(self.duration[rows] / self.timestep).astype(np.intp) + 1
+        return np.minimum(ends, self.phase.shape[1])

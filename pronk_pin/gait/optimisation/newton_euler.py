@@ -1,0 +1,248 @@
+"""Recursive Newton-Euler in CasADi, over the trunk and its left legs, in world axes.
+
+Links, joint axes and inertias are Pinocchio's. The tree is short and every leg is alike, so that
+world axes, with classical accelerations, keep it plain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from ..._typing import Array
+from ...robot import JOINTS, Base, Robot
+
+BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3}
+"""Coordinates of the trunk: x and z, and pitch where it is free."""
+
+
+Half = Literal["mean", "difference"]
+"""Part of a pair of legs: their mean, or half their difference, left less right."""
+
+_MIRROR = {"L": "R", "R": "L"}
+
+
+class FrameMotion(NamedTuple):
+    """Motion of a frame, in world axes; three rows each."""
+
+    position: ca.SX
+    velocity: ca.SX
+    acceleration: ca.SX
+    """Classical acceleration of the origin."""
+    omega: ca.SX
+    alpha: ca.SX
+
+
+class _Inertia(NamedTuple):
+    """Inertia of a body about the origin of its frame: what forces are linear in."""
+
+    mass: float
+    """[kg]"""
+    first: Array
+    """Mass times centre of mass [kg m], shape (3,)."""
+    second: Array
+    """Rotational inertia about the origin [kg m^2], shape (3, 3)."""
+
+    def mean(self, other: _Inertia) -> _Inertia:
+        """Mean with another inertia."""
+        return _Inertia(
+            0.5 * (self.mass + other.mass),
+            0.5 * (self.first + other.first),
+            0.5 * (self.second + other.second),
+        )
+
+    def mirrored(self) -> _Inertia:
+        """Mirror image about the plane y = 0."""
+        flip = np.array([1.0, -1.0, 1.0])
+        return _Inertia(self.mass, flip * self.first, np.outer(flip, flip) * self.second)
+
+    def minus(self) -> _Inertia:
+        """The negative of the inertia."""
+        return _Inertia(-self.mass, -self.first, -self.second)
+
+
+@dataclass(frozen=True)
+class _Link:
+    """A link as Pinocchio has it, with the joint that carries it.
+
+    Attributes:
+        rotation, translation: Placement of the joint in its parent, shapes (3, 3) and (3,).
+        axis: Joint axis in the joint's frame, shape (3,).
+        body: Inertia, in the joint's frame.
+        armature: Inertia of the rotor as the joint feels it [kg m^2].
+    """
+
+    rotation: Array
+    translation: Array
+    axis: Array
+    body: _Inertia
+    armature: float
+
+
+def newton_euler(
+    robot: Robot,
+    legs: tuple[str, ...],
+    state: tuple[ca.SX, ca.SX, ca.SX],
+    lam: ca.SX,
+    gravity: Array,
+    lever: Array,
+    base: Base,
+    half: Half = "mean",
+) -> tuple[ca.SX, list[FrameMotion]]:
+    """Inverse dynamics of the folded robot, by recursive Newton-Euler.
+
+    Args:
+        robot: The robot.
+        legs: The legs that are kept; each counts twice on the trunk.
+        state: q, v and a of the folded robot, (8,) each, or (9,) with pitch.
+        lam: Contact forces of the kept feet in the world frame [N], (3, feet).
+        gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
+        lever: From a foot's centre to where `lam` acts, in the world [m], shape (3,).
+        base: How the trunk may move.
+        half: With which inertias of the legs. Where left and right differ, the mean of a leg and
+            its mirror image gives what the pair needs on average, and the trunk exactly; half
+            their difference, with no trunk and no forces, what the left leg needs beyond that, and
+            the right one less.
+
+    Returns:
+        The forces that must act along each coordinate (8 or 9), and the motion of the feet.
+    """
+    q, v, a = state
+    nb = BASE_COORDINATES[base]
+    trunk, rotation = _planar(q[:nb], v[:nb], a[:nb])
+    on_trunk, moment = _wrench(_inertia(robot, 1), rotation, trunk, gravity)
+    pairs = {leg: _links(robot, leg, half) for leg in legs}
+    torques, feet = [], []
+    for i, leg in enumerate(legs):
+        rows = slice(nb + i * len(JOINTS), nb + (i + 1) * len(JOINTS))
+        joints = (q[rows], v[rows], a[rows])
+        carried, torque, foot = _leg(
+            robot, leg, pairs[leg], (trunk, rotation), joints, lam[:, i], gravity, lever
+        )
+        on_trunk = on_trunk + 2.0 * carried[0]  # the leg and its mirror image
+        moment = moment + 2.0 * carried[1]
+        torques.append(torque)
+        feet.append(foot)
+    along = [on_trunk[0], on_trunk[2], moment[1]][:nb]
+    return ca.vertcat(*along, *torques), feet
+
+
+def _planar(q: ca.SX, v: ca.SX, a: ca.SX) -> tuple[FrameMotion, ca.SX]:
+    """Motion and rotation of the trunk, held to the sagittal plane."""
+    position, velocity, acceleration = (ca.vertcat(x[0], 0.0, x[1]) for x in (q, v, a))
+    if q.numel() == 2:
+        still = ca.SX(3, 1)
+        return FrameMotion(position, velocity, acceleration, still, still), ca.SX.eye(3)
+    omega, alpha = (ca.vertcat(0.0, x[2], 0.0) for x in (v, a))
+    rotation = _rotation(np.array([0.0, 1.0, 0.0]), q[2])
+    return FrameMotion(position, velocity, acceleration, omega, alpha), rotation
+
+
+def _leg(
+    robot: Robot,
+    leg: str,
+    links: list[_Link],
+    trunk: tuple[FrameMotion, ca.SX],
+    joints: tuple[ca.SX, ca.SX, ca.SX],
+    lam: ca.SX,
+    gravity: Array,
+    lever: Array,
+) -> tuple[tuple[ca.SX, ca.SX], ca.SX, FrameMotion]:
+    """One leg: the force on it from the trunk and its moment about the trunk's origin (3 each),
+    its motor torques (3), its foot's motion."""
+    motion, rotation = trunk
+    motions, axes, wrenches, rotors = [], [], [], []
+    for link, q, v, a in zip(links, *map(ca.vertsplit, joints), strict=True):
+        motion = _moved(motion, rotation @ ca.DM(link.translation))
+        rotation = rotation @ ca.sparsify(ca.DM(link.rotation)) @ _rotation(link.axis, q)
+        axis = rotation @ ca.sparsify(ca.DM(link.axis))
+        motion = motion._replace(
+            omega=motion.omega + axis * v,
+            alpha=motion.alpha + axis * a + ca.cross(motion.omega, axis * v),
+        )
+        motions.append(motion)
+        axes.append(axis)
+        wrenches.append(_wrench(link.body, rotation, motion, gravity))
+        rotors.append(link.armature * a)
+
+    frame = robot.model.frames[robot.foot_ids[robot.legs.index(leg)]]
+    foot = _moved(motion, rotation @ ca.DM(frame.placement.translation))
+    force, point = -lam, foot.position + lever
+    moment = ca.SX.zeros(3)
+    torques = []
+    # From the foot up: what the joint above must carry, about its own origin.
+    for joint, axis, wrench in zip(motions[::-1], axes[::-1], wrenches[::-1], strict=True):
+        moment = moment + ca.cross(point - joint.position, force) + wrench[1]
+        force, point = force + wrench[0], joint.position
+        torques.append(ca.dot(axis, moment))
+    moment = moment + ca.cross(point - trunk[0].position, force)
+    return (force, moment), ca.vertcat(*torques[::-1]) + ca.vertcat(*rotors), foot
+
+
+def _moved(motion: FrameMotion, arm: ca.SX) -> FrameMotion:
+    """Motion of a point that is fixed to a moving body, at `arm` from its origin."""
+    omega, alpha = motion.omega, motion.alpha
+    swing = ca.cross(omega, arm)
+    return FrameMotion(
+        motion.position + arm,
+        motion.velocity + swing,
+        motion.acceleration + ca.cross(alpha, arm) + ca.cross(omega, swing),
+        omega,
+        alpha,
+    )
+
+
+def _wrench(
+    body: _Inertia, rotation: ca.SX, motion: FrameMotion, gravity: Array
+) -> tuple[ca.SX, ca.SX]:
+    """Force and moment about its frame's origin that a body's own motion needs, in world axes."""
+    first = rotation @ ca.DM(body.first)
+    second = rotation @ ca.DM(body.second) @ rotation.T
+    fall, omega, alpha = motion.acceleration - gravity, motion.omega, motion.alpha
+    force = body.mass * fall + ca.cross(alpha, first) + ca.cross(omega, ca.cross(omega, first))
+    moment = ca.cross(first, fall) + second @ alpha + ca.cross(omega, second @ omega)
+    return force, moment
+
+
+def _rotation(axis: Array, angle: ca.SX) -> ca.SX:
+    """Rotation matrix about an axis a, `1 + sin(angle) a^ + (1 - cos(angle)) a^ a^` (Rodrigues)."""
+    skew = ca.sparsify(ca.DM(np.cross(np.eye(3), axis)))
+    return ca.SX.eye(3) + ca.sin(angle) * skew + (1.0 - ca.cos(angle)) * (skew @ skew)
+
+
+def _links(robot: Robot, leg: str, half: Half) -> list[_Link]:
+    """The links of a leg from the trunk down, with their share of the pair's inertias."""
+    links = []
+    names = zip(robot.spec.leg_joints(leg), robot.spec.leg_joints(mirrored(leg)), strict=True)
+    for own, other in names:
+        i, j = robot.model.getJointId(own), robot.model.getJointId(other)
+        placement, image = robot.model.jointPlacements[i], _inertia(robot, j).mirrored()
+        armature = [float(robot.model.armature[robot.model.joints[k].idx_v]) for k in (i, j)]
+        sign = 1.0 if half == "mean" else -1.0
+        links.append(
+            _Link(
+                rotation=np.array(placement.rotation),
+                translation=np.array(placement.translation),
+                axis=np.array(robot.model.joints[i].createData().S).ravel()[3:],
+                body=_inertia(robot, i).mean(image if half == "mean" else image.minus()),
+                armature=0.5 * (armature[0] + sign * armature[1]),
+            )
+        )
+    return links
+
+
+def mirrored(leg: str) -> str:
+    """Name of the leg on the other side: FL and FR, RL and RR."""
+    return leg[:-1] + _MIRROR[leg[-1]]
+
+
+def _inertia(robot: Robot, joint: int) -> _Inertia:
+    """Inertia of the body that a joint of Pinocchio's model carries."""
+    body = robot.model.inertias[joint]
+    mass, com = float(body.mass), np.array(body.lever)
+    steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return _Inertia(mass, mass * com, np.array(body.inertia) + steiner)

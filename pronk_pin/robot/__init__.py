@@ -1,0 +1,65 @@
+"""What the robot is: its rigid-body model, names, limits, parameters and layouts.
+
+Comes in: a URDF, the names of its parts (`RobotSpec`), what it lacks (`ModelParameters`).
+Goes out: a `Robot`, and conversions between the orders of Pinocchio, MuJoCo and the paper.
+"""
+
+from .base import BASES, Base
+from .conventions import (
+    MujocoState,
+    PinocchioState,
+    from_mujoco,
+    from_paper,
+    joint_order,
+    rotation_matrix,
+    to_mujoco,
+    to_paper,
+)
+from .parameters import NOTHING, SLIDING, ModelParameters
+from .robot import NB, NL, Robot, load_robot
+from .robot_spec import JOINTS, ROBOTS, RobotSpec
+from .state import (
+    REFUSALS,
+    as_array,
+    as_numbers,
+    as_one,
+    as_q,
+    as_robot,
+    as_state,
+    leg_indices,
+    sound_base,
+)
+from .urdf_file import read_urdf
+
+__all__ = [
+    "BASES",
+    "JOINTS",
+    "NB",
+    "NL",
+    "NOTHING",
+    "REFUSALS",
+    "ROBOTS",
+    "SLIDING",
+    "Base",
+    "ModelParameters",
+    "MujocoState",
+    "PinocchioState",
+    "Robot",
+    "RobotSpec",
+    "as_array",
+    "as_numbers",
+    "as_one",
+    "as_q",
+    "as_robot",
+    "as_state",
+    "from_mujoco",
+    "from_paper",
+    "joint_order",
+    "leg_indices",
+    "load_robot",
+    "read_urdf",
+    "rotation_matrix",
+    "sound_base",
+    "to_mujoco",
+    "to_paper",
+]

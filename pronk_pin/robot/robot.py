@@ -1,0 +1,286 @@
+"""The robot: its rigid-body model with names, feet, limits and standing posture.
+
+Everything is read from the URDF; a `RobotSpec` only says which names play which part, see
+`pronk_pin.robot.robot_spec`.
+
+Layout, here and everywhere: ``q = [x, y, z, qx, qy, qz, qw, joints]`` (19), ``v = [base linear and
+angular velocity in the body frame, joints]`` (18), joints by leg FL, FR, RL, RR and within a leg
+hip, thigh, calf.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from .._checks import instance_of, known_name, numbers
+from .._typing import Array, IntArray
+from ..errors import InvalidInput
+from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
+from .robot_spec import JOINTS, ROBOTS, RobotSpec, check_names, locate, read_foot_radius
+from .urdf_file import read_urdf
+
+__all__ = ["JOINTS", "NB", "NL", "ROBOTS", "Robot", "RobotSpec", "load_robot"]
+
+NB, NL = 6, 12
+"""Velocities of the floating base, and actuated joints of a robot with four legs of three."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A legged robot: Pinocchio's model with its names, limits and parameters.
+
+    Attributes:
+        spec: The names the robot was built from.
+        urdf_path: The URDF it was read from.
+        urdf: What was in it then.
+        package_dir: Folder against which the URDF's `package://` meshes are resolved.
+        model: Pinocchio's model with a floating base; treat it as read-only.
+        foot_radius: Radius of the spherical feet [m].
+        urdf_joint_names: The joints in the order of the URDF document, which is MuJoCo's order.
+        parameters: What the model says beyond the URDF, see `with_parameters`.
+        bare: The robot without its parameters; None where it has none.
+    """
+
+    spec: RobotSpec
+    urdf_path: Path
+    urdf: bytes = field(repr=False)
+    package_dir: Path
+    model: pin.Model
+    foot_radius: float
+    urdf_joint_names: tuple[str, ...]
+    parameters: ModelParameters = NOTHING
+    bare: Robot | None = field(default=None, repr=False)
+
+    def with_parameters(self, parameters: ModelParameters) -> Robot:
+        """The robot with rotors, friction, motors and load that its URDF leaves out.
+
+        Dynamics, inverse dynamics, impacts and gait optimisation of the robot that comes out use
+        them; parameters that this robot has already are replaced. A simulated `World` does not:
+        what is true there is the scenario's to say.
+
+        Args:
+            parameters: The parameters.
+
+        Raises:
+            InvalidInput: Parameters of another number of joints, or a trunk without mass.
+        """
+        return _mended(self.bare or self, instance_of("parameters", parameters, ModelParameters))
+
+    @property
+    def name(self) -> str:
+        """Short name of the robot."""
+        return self.spec.name
+
+    @cached_property
+    def nq(self) -> int:
+        """Size of q."""
+        return int(self.model.nq)
+
+    @cached_property
+    def nv(self) -> int:
+        """Size of v."""
+        return int(self.model.nv)
+
+    @cached_property
+    def nu(self) -> int:
+        """Number of motors."""
+        return self.nv - NB
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """Legs in the order of q."""
+        return self.spec.legs
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Joints in the order of q: those of the legs, and any others the URDF has."""
+        return tuple(self.model.names[2:])
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """Frames of the feet, in the order of the legs."""
+        return self.spec.foot_names
+
+    @cached_property
+    def foot_ids(self) -> tuple[int, ...]:
+        """Pinocchio's frame ids of the feet."""
+        return tuple(int(self.model.getFrameId(name)) for name in self.foot_names)
+
+    @cached_property
+    def data(self) -> pin.Data:
+        """Scratch memory for Pinocchio's algorithms; not to be shared between threads."""
+        return self.model.createData()
+
+    @cached_property
+    def at_rest(self) -> Array:
+        """A velocity or acceleration of zero, shape (18,); read-only."""
+        zero = np.zeros(self.nv)
+        zero.flags.writeable = False
+        return zero
+
+    @cached_property
+    def q_min(self) -> Array:
+        """Lower joint limits [rad], shape (12,)."""
+        return np.array(self.model.lowerPositionLimit[-self.nu :])
+
+    @cached_property
+    def q_max(self) -> Array:
+        """Upper joint limits [rad], shape (12,)."""
+        return np.array(self.model.upperPositionLimit[-self.nu :])
+
+    @cached_property
+    def v_max(self) -> Array:
+        """Joint velocity limits [rad/s], shape (12,)."""
+        return np.array(self.model.velocityLimit[-self.nu :])
+
+    @cached_property
+    def tau_max(self) -> Array:
+        """Torque limits [N m], shape (12,)."""
+        return np.array(self.model.effortLimit[-self.nu :])
+
+    @cached_property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        return float(pin.computeTotalMass(self.model))
+
+    @cached_property
+    def gravity(self) -> float:
+        """Gravitational acceleration, positive [m/s^2]."""
+        return float(-self.model.gravity.linear[2])
+
+    @cached_property
+    def joint_kinds(self) -> IntArray:
+        """For each joint its place in the leg, 0 for a hip; -1 for joints of no leg, (12,)."""
+        kinds = {
+            name: kind for leg in self.legs for kind, name in enumerate(self.spec.leg_joints(leg))
+        }
+        return np.array([kinds.get(name, -1) for name in self.joint_names], dtype=np.intp)
+
+    def of_joint(self, name: str) -> Array:
+        """A parameter out of `armature`, `damping` and `coulomb`, by joint, shape (12,)."""
+        return self.parameters.of_joint(name, self.joint_kinds, len(self.spec.joints))
+
+    def friction(self, rates: Array) -> Array:
+        """Friction `d v + c tanh(v / v_s)` at joint velocities v (..., 12) [rad/s], in [N m]."""
+        sliding = np.tanh(rates / SLIDING)
+        return np.asarray(self.of_joint("damping") * rates + self.of_joint("coulomb") * sliding)
+
+    def friction_rate(self, rates: Array) -> Array:
+        """Derivative of `friction` by the joint velocities, shape (..., 12) [N m s/rad]."""
+        slope = 1.0 / (SLIDING * np.cosh(np.clip(rates / SLIDING, -300.0, 300.0)) ** 2)
+        return np.asarray(self.of_joint("damping") + self.of_joint("coulomb") * slope)
+
+    def joint_torques(self, tau: Array, rates: Array) -> Array:
+        """Torques that move the joints, from those that the motors are commanded.
+
+        Args:
+            tau: Motor torques [N m], shape (..., 12).
+            rates: Joint velocities [rad/s], shape (..., 12).
+        """
+        if self.parameters.ideal_motors:
+            return tau
+        return np.asarray(self.parameters.torque_constant * tau - self.friction(rates))
+
+    def motor_torques(self, torques: Array, rates: Array) -> Array:
+        """Motor commands for joint torques: the inverse of `joint_torques`."""
+        if self.parameters.ideal_motors:
+            return torques
+        return np.asarray((torques + self.friction(rates)) / self.parameters.torque_constant)
+
+    @cached_property
+    def standing(self) -> Array:
+        """Standing posture with the feet on the ground z = 0, shape (19,)."""
+        q, names = pin.neutral(self.model), self.spec.joint_names
+        angles = np.resize(self.spec.standing, len(names))
+        q[[NB + 1 + self.joint_names.index(name) for name in names]] = angles
+        pin.framesForwardKinematics(self.model, self.data, q)
+        lowest = min(self.data.oMf[foot].translation[2] for foot in self.foot_ids)
+        q[2] = self.foot_radius - lowest
+        return np.array(q)
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the URDF, and of the parameters if any; results and gaits carry it."""
+        document = self.urdf
+        if self.parameters != NOTHING:
+            document += repr(self.parameters).encode()
+        return hashlib.sha256(document).hexdigest()
+
+    def q_from_base(self, position: Array, joints: Array, *, pitch: Array | float = 0.0) -> Array:
+        """Configuration from the trunk's position, its pitch and the joints; batched.
+
+        Args:
+            position: Trunk position in the world [m], shape (..., 3).
+            joints: Joint angles [rad], shape (..., 12).
+            pitch: Rotation about the y axis [rad], shape (...).
+
+        Returns:
+            q, shape (..., 19).
+        """
+        # The checks of states are a floor above.
+        position, joints, pitch = numbers(position=position, joints=joints, pitch=pitch)
+        fits = position.shape[-1:] == (3,) and joints.shape == (*position.shape[:-1], self.nu)
+        if not fits or pitch.shape not in ((), position.shape[:-1]):
+            raise InvalidInput(
+                f"position, joints and pitch have the shapes {position.shape}, {joints.shape} and "
+                f"{pitch.shape}; give (..., 3), (..., {self.nu}) and (...), of the same batch"
+            )
+        half = 0.5 * np.broadcast_to(pitch, position.shape[:-1])
+        zero = np.zeros_like(half)
+        quaternion = np.stack([zero, np.sin(half), zero, np.cos(half)], axis=-1)
+        return np.concatenate([position, quaternion, joints], axis=-1)
+
+
+def load_robot(robot: str | RobotSpec = "a1") -> Robot:
+    """Load a robot by its short name, or from a specification of your own.
+
+    Args:
+        robot: "a1", "go1", "go2" or "solo12", or a `RobotSpec`.
+
+    Raises:
+        UnknownName: There is no robot of that name.
+        FileProblem: The URDF is missing or cannot be read.
+        InvalidInput: The URDF lacks a joint or a foot that the specification names.
+    """
+    if isinstance(robot, str):
+        robot = ROBOTS[known_name("robot", robot, ROBOTS)]
+    wanted = f"a RobotSpec, or a name, one of: {', '.join(ROBOTS)}"
+    return _load(instance_of("robot", robot, RobotSpec, wanted))
+
+
+@lru_cache(maxsize=16)
+def _load(spec: RobotSpec) -> Robot:
+    path, package_dir = locate(spec.urdf)
+    data, document, model = read_urdf(path)
+    model.name = spec.name
+    check_names(spec, model, path)
+    radius = read_foot_radius(document, spec) if spec.foot_radius is None else spec.foot_radius
+    order = [element.get("name", "") for element in document.findall("joint")]
+    joints = set(model.names[2:])
+    return Robot(
+        spec=spec,
+        urdf_path=path,
+        urdf=data,
+        package_dir=package_dir,
+        model=model,
+        foot_radius=radius,
+        urdf_joint_names=tuple(name for name in order if name in joints),
+    )
+
+
+@lru_cache(maxsize=32)
+def _mended(bare: Robot, parameters: ModelParameters) -> Robot:
+    if parameters == NOTHING:
+        return bare
+    model = bare.model.copy()
+    robot = replace(bare, model=model, parameters=parameters, bare=bare)
+    by_joint = {name: robot.of_joint(name) for name in BY_JOINT}  # complains of a wrong number
+    model.armature = model.armature + np.concatenate([np.zeros(NB), by_joint["armature"]])
+    model.inertias[1] = loaded(model.inertias[1], parameters)
+    return robot

@@ -1,0 +1,199 @@
+"""Specification of a robot: its URDF, and the roles of the links and joints in it."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+
+import pinocchio as pin
+
+from .._checks import file_name, none_or, real, reals, sequence_of, text
+from ..errors import FileProblem, InvalidInput
+from ..storage import check_file
+
+JOINTS = ("hip", "thigh", "calf")
+"""Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
+
+_DATA_DISTRIBUTION = "example-robot-data"
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """Roles of the names of a URDF in a legged robot.
+
+    Attributes:
+        name: Short name, as on the command line.
+        urdf: Path of the URDF: absolute, or relative to the `robots` folder of example-robot-data.
+        base_link: Link of the trunk.
+        legs: Legs in Pinocchio's order, which is alphabetical.
+        joints: What the URDF calls a leg's joints, from the trunk down. Closed-form leg kinematics
+            and the gaits need three: hip, thigh and calf.
+        joint_pattern: Name of a joint, with `{leg}` and `{joint}`.
+        foot_pattern: Name of the foot's frame, with `{leg}`.
+        standing: Joint angles of the standing posture [rad]: of one leg, the same for each, or of
+            all legs one after the other.
+        foot_radius: Radius of the spherical feet [m]; None to read it from the collision sphere
+            in the URDF.
+    """
+
+    name: str
+    urdf: str
+    base_link: str = "trunk"
+    legs: tuple[str, ...] = ("FL", "FR", "RL", "RR")
+    joints: tuple[str, ...] = JOINTS
+    joint_pattern: str = "{leg}_{joint}_joint"
+    foot_pattern: str = "{leg}_foot"
+    standing: tuple[float, ...] = (0.0, 0.9, -1.8)
+    foot_radius: float | None = None
+
+    def __post_init__(self) -> None:
+        file_name("name", self.name)
+        for name in ("urdf", "base_link", "joint_pattern", "foot_pattern"):
+            if not text(name, getattr(self, name)):
+                raise InvalidInput(f"{name} is empty; give what stands in the URDF")
+        for name in ("legs", "joints"):
+            object.__setattr__(self, name, sequence_of(name, getattr(self, name), text))
+        self._check_patterns()
+        object.__setattr__(self, "standing", reals("standing", self.standing))
+        if len(self.standing) not in (len(self.joints), len(self.joint_names)):
+            raise InvalidInput(
+                f"standing has {len(self.standing)} angles; give {len(self.joints)}, for the "
+                f"joints of one leg, or {len(self.joint_names)}, for all legs"
+            )
+        object.__setattr__(self, "foot_radius", none_or(real, "foot_radius", self.foot_radius))
+        if self.foot_radius is not None and self.foot_radius < 0.0:
+            raise InvalidInput(
+                f"foot_radius={self.foot_radius}; give a length in metres, 0 for point feet"
+            )
+
+    def _check_patterns(self) -> None:
+        for name in ("joint_pattern", "foot_pattern"):
+            pattern = getattr(self, name)
+            try:
+                pattern.format(leg="FL", joint="hip")
+            except (KeyError, IndexError, ValueError) as error:
+                raise InvalidInput(
+                    f"{name}={pattern!r} is not a pattern ({error}); write {{leg}} where the name "
+                    "of the leg stands, and {joint} where that of the joint does"
+                ) from error
+
+    def leg_joints(self, leg: str) -> tuple[str, ...]:
+        """Names of a leg's joints, from the trunk down."""
+        return tuple(self.joint_pattern.format(leg=leg, joint=joint) for joint in self.joints)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The joints of the legs, by leg."""
+        return tuple(name for leg in self.legs for name in self.leg_joints(leg))
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """The feet, in the order of the legs."""
+        return tuple(self.foot_pattern.format(leg=leg) for leg in self.legs)
+
+
+ROBOTS = {
+    spec.name: spec
+    for spec in (
+        RobotSpec("a1", "a1_description/urdf/a1.urdf"),
+        RobotSpec("go1", "go1_description/urdf/go1.urdf"),
+        RobotSpec(
+            "go2",
+            "go2_description/urdf/go2.urdf",
+            base_link="base",
+            # The feet are meshes; half their extent fore and aft, 45.3 mm, of foot_convex.stl.
+            foot_radius=0.0227,
+        ),
+        RobotSpec(
+            "solo12",
+            "solo_description/robots/solo12.urdf",
+            base_link="base_link",
+            legs=("FL", "FR", "HL", "HR"),
+            joints=("HAA", "HFE", "KFE"),
+            joint_pattern="{leg}_{joint}",
+            foot_pattern="{leg}_FOOT",
+            # "straight_standing" of solo.srdf: knees point towards each other.
+            standing=(0.0, 0.8, -1.6) * 2 + (0.0, -0.8, 1.6) * 2,
+            # The feet are meshes: discs of 32 mm, of solo_foot.stl.
+            foot_radius=0.016,
+        ),
+    )
+}
+"""Robots known by name."""
+
+
+def check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:
+    """Check that the model has what the specification names, one angle a joint.
+
+    Raises:
+        InvalidInput: It has not.
+    """
+    joints = list(model.names[2:])
+    if [name for name in joints if name in spec.joint_names] != list(spec.joint_names):
+        raise InvalidInput(
+            f"{path.name}: its joints are {', '.join(joints)}; the specification expects "
+            f"{', '.join(spec.joint_names)}; adapt joints, joint_pattern and legs of the RobotSpec"
+        )
+    for name, joint in zip(joints, model.joints[2:], strict=True):
+        if joint.nq != 1:
+            raise InvalidInput(
+                f"{path.name}: joint {name} has no limits ({joint.shortname()}), so Pinocchio "
+                "writes its angle as a cosine and a sine; make it a revolute joint with limits"
+            )
+    for name in spec.foot_names:
+        if not model.existFrame(name):
+            raise InvalidInput(f"{path.name} has no frame {name}; adapt foot_pattern")
+    if not model.existFrame(spec.base_link):
+        raise InvalidInput(f"{path.name} has no link {spec.base_link}; adapt base_link")
+
+
+def read_foot_radius(document: ElementTree.Element, spec: RobotSpec) -> float:
+    """Radius of the first foot's collision sphere [m].
+
+    Raises:
+        InvalidInput: It has none, or one without a radius.
+    """
+    foot = spec.foot_names[0]
+    sphere = document.find(f"./link[@name='{foot}']/collision/geometry/sphere")
+    if sphere is None:
+        raise InvalidInput(
+            f"{spec.name}: foot {foot} has no collision sphere; give foot_radius in the RobotSpec"
+        )
+    text = sphere.get("radius", "")
+    try:
+        radius = float(text)
+    except ValueError:
+        radius = math.nan
+    if not 0.0 < radius < math.inf:
+        raise InvalidInput(
+            f"{spec.name}: the collision sphere of foot {foot} has the radius '{text}'; give a "
+            "length in metres"
+        )
+    return radius
+
+
+def locate(urdf: str) -> tuple[Path, Path]:
+    """Path of a URDF and of the folder that its `package://` addresses start from.
+
+    Raises:
+        FileProblem: There is no such URDF.
+    """
+    path = Path(urdf).expanduser()
+    if path.is_absolute():
+        check_file(path, "check the path in the RobotSpec")
+        return path, path.parent
+    wanted = f"example-robot-data/robots/{urdf}"
+    try:
+        files = importlib.metadata.files(_DATA_DISTRIBUTION) or []
+    except importlib.metadata.PackageNotFoundError:
+        files = []
+    for file in files:
+        if file.as_posix().endswith(wanted):
+            located = Path(str(file.locate())).resolve()
+            return located, located.parents[len(Path(wanted).parts) - 1]
+    raise FileProblem(
+        wanted, "not found in the installed packages", f"run 'pip install {_DATA_DISTRIBUTION}'"
+    )

@@ -1,0 +1,98 @@
+"""URDF files: the document, and Pinocchio's model of it, read once and of the same bytes."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from ..errors import FileProblem
+from ..storage import LARGEST_DOCUMENT, damaged, parse_xml, read_bytes, refuse_nan
+
+_CHECK = "check the file"
+
+LARGEST_QUANTITY = 1e6
+"""Masses [kg], lengths [m] and inertias [kg m^2] beyond which nothing is a robot."""
+
+
+class Urdf(NamedTuple):
+    """A URDF.
+
+    Attributes:
+        data: The bytes of the file.
+        root: The document.
+        model: Pinocchio's model with a floating base.
+    """
+
+    data: bytes
+    root: ElementTree.Element
+    model: pin.Model
+
+
+def read_urdf(path: Path) -> Urdf:
+    """Read a URDF.
+
+    Raises:
+        FileProblem: It cannot be read, is none, or has numbers that are none of a robot.
+    """
+    data = read_bytes(path, _CHECK, limit=LARGEST_DOCUMENT)
+    root = parse_xml(data, path, _CHECK, what="URDF")
+    refuse_nan(root, path, _CHECK, what="URDF")  # a mass of NaN is taken for none
+    said: list[str] = []
+    try:
+        # What Pinocchio calls reads UTF-8 only.
+        text = data.decode()
+        with _overheard(said):
+            model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+        if said:  # it goes on without the link's inertia, say
+            raise ValueError("and leaves that out")
+    except Exception as error:
+        reason = " ".join([*said[:1], *str(error).split()])[:500]
+        raise FileProblem(path, f"not a usable URDF ({reason})", _CHECK) from error
+    _check_numbers(path, model)
+    return Urdf(data, root, model)
+
+
+@contextlib.contextmanager
+def _overheard(said: list[str]) -> Iterator[None]:
+    """Keep what a library in C++ calls errors on stderr: they are part of our error's one line."""
+    with contextlib.ExitStack() as stack:
+        try:
+            kept = stack.enter_context(tempfile.TemporaryFile())
+            stderr = os.dup(2)
+        except OSError:  # no room, or no stderr: it is not worth an error
+            yield
+            return
+        stack.callback(os.close, stderr)
+        os.dup2(kept.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(stderr, 2)
+            kept.seek(0)
+            lines = kept.read().decode(errors="replace").splitlines()
+            errors = [line.removeprefix("Error:") for line in lines if line.startswith("Error:")]
+            said += [" ".join(line.split()) for line in errors]
+
+
+def _check_numbers(path: Path, model: pin.Model) -> None:
+    for name, inertia, placement in zip(
+        model.names, model.inertias, model.jointPlacements, strict=True
+    ):
+        numbers = np.concatenate(
+            [[inertia.mass], inertia.lever, inertia.inertia.ravel(), placement.homogeneous.ravel()]
+        )
+        if not np.all(np.abs(numbers) < LARGEST_QUANTITY) or inertia.mass < 0.0:
+            reason = f"mass, inertia or place of joint {name} and its link are none of a robot"
+            raise damaged(path, reason, _CHECK, what="URDF")
+    limits = (model.lowerPositionLimit, model.upperPositionLimit)
+    for bounds in (*limits, model.velocityLimit, model.effortLimit):
+        if np.any(np.isnan(bounds)):
+            raise damaged(path, "a joint's limit is not a number", _CHECK, what="URDF")

@@ -1,0 +1,360 @@
+"""The report of a result: the answer, tables, figures, limitations and where the numbers are from.
+
+One document, written as a self-contained report.html and as report.md with its figures beside it.
+"""
+
+from __future__ import annotations
+
+import shlex
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from matplotlib.figure import Figure
+
+from ...compare import ForeignRobot, Results
+from ...compare.experiment import SUITES, load_suite
+from ...compare.metrics import (
+    CONFIDENCE,
+    LEARNER,
+    LEAST_UNITS,
+    VARIABLES,
+    Practice,
+    family,
+    practice,
+    sampled,
+)
+from ...compare.report import (
+    SHOWN,
+    answer,
+    answer_in_words,
+    beside_note,
+    beside_the_paper,
+    families,
+    limitations,
+    sampled_worlds,
+    units_of_intervals,
+    verdict,
+)
+from ...errors import cannot_write
+from .. import figures
+from ..figure_style import save_figure
+from . import report_tables
+from .document import Document
+
+SHOWN_SPEED = 0.3
+"""Speed of the tracking figure [m/s]: the paper's."""
+
+FIGURES = "figures"
+"""Folder of the figures of report.md."""
+
+_CAPTIONS = {
+    "errors": "Peak stance error by speed, beside the paper's Table I.",
+    "learning": "Peak stance error while learning; dotted: controllers that do not learn.",
+    "tracking": "Calf and thigh of the front left leg before and after the learning is switched on "
+    "(the paper's Fig. 3).",
+    "torques": "Torque library: the learned feedforward, averaged over the last 30 strides "
+    "(the paper's Fig. 4).",
+    "surface": "The same torques over speed and phase.",
+    "by-world": "Mean peak stance error in each sampled world, from the one in which practice "
+    "leaves the least of the calf's error to the one with the most.",
+    "difference": "What practice adds to the model: learned minus the model's feedforward torque.",
+}
+
+_READING = (
+    "Errors are peaks of the joint angle's error in stance, means over legs, the last 30 strides "
+    f"and the robots that did not fall. Intervals hold {CONFIDENCE:.0%} (BCa bootstrap). The unit "
+    "that is drawn is the sampled world, or the seed in a world that is not sampled, or the speed "
+    f"where there are fewer than {LEAST_UNITS} of them. A controller is better or worse than the "
+    "model where the interval of the paired difference excludes 0, else the matter is open. Wins, "
+    "or the probability of improvement, are the share of the robots whose error is smaller than "
+    "the same robot's with the model (Wilson interval). The model is beaten at the first stride "
+    "below its level from which on the mean over five strides stays below, in calf and thigh."
+)
+
+
+def write_report(results: Results) -> Path:
+    """Write report.html, report.md and its figures into the results folder.
+
+    Returns:
+        The path of report.html.
+
+    Raises:
+        FileProblem: The summary or the strides are missing or damaged, or it cannot be written.
+    """
+    document = report(results)
+    path = results.write("report.html", document.to_html())
+    folder = results.folder / FIGURES
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    for name, picture in document.pictures().items():
+        results.write(f"{FIGURES}/{name}", picture)
+    results.write("report.md", document.to_markdown(FIGURES))
+    return path
+
+
+def report(results: Results) -> Document:
+    """The report as a document."""
+    summary, worlds = results.summary(), families(results.experiment.scenarios)
+    document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
+    table = answer(summary)
+    document.text(answer_in_words(summary, table=table), "verdict")
+    if len(worlds) > 1:
+        _all_worlds(document, results, table)
+    for world in worlds:
+        _world(document, results, summary, table, world)
+    if results.foreign is not None:
+        _foreign_robot(document, results.foreign)
+    document.heading("How to read the numbers", "statistics")
+    document.text(_READING)
+    document.heading("Known limitations", "limits")
+    document.bullets(limitations(results))
+    _provenance(document, results)
+    return document
+
+
+def command(results: Results) -> str:
+    """The command that makes this result again."""
+    experiment = results.experiment
+    for name in SUITES:
+        if load_suite(name) == experiment:
+            return f"pronk-pin compare --suite {name}"
+    words = ["pronk-pin compare", f"--robot {experiment.robot}"]
+    words += ["--speeds " + " ".join(f"{speed:g}" for speed in experiment.speeds)]
+    words += ["--controllers " + " ".join(experiment.controllers)]
+    words += ["--scenarios " + " ".join(experiment.scenarios)]
+    words += ["--seeds " + " ".join(map(str, experiment.seeds))]
+    words += [f"--base {experiment.base}"]
+    words += [f"--world {shlex.quote(experiment.world)}"] if experiment.world else []
+    schedule = experiment.schedule
+    words += [
+        f"--schedule.{name} {getattr(schedule, name):g}"
+        for name in ("startup", "practice", "learning", "scatter")
+    ]
+    return " ".join(words)
+
+
+def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
+    """The report's figures about one scenario, by name.
+
+    Those of what was learned only where `ilc` ran, and a robot that it taught something stayed up.
+    """
+    controllers = dict.fromkeys(cell.controller for cell in reversed(results.experiment.cells()))
+    strides = {
+        name: results.all_strides(controller=name, scenario=scenario) for name in controllers
+    }
+    found = {
+        "errors": figures.errors_by_speed(results.summary(), scenario=scenario),
+        "learning": figures.learning_curves(strides),
+    }
+    learned = _learned(strides[LEARNER]) if LEARNER in strides else None
+    if learned is not None and learned.sizes["speed"]:
+        speed = min(learned["speed"].to_numpy(), key=lambda v: abs(v - SHOWN_SPEED))
+        found["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
+        found["torques"] = figures.torque_library(learned)
+        found["surface"] = figures.torque_surface(learned)
+        model = figures.stayed_up(strides["model"]) if "model" in strides else None
+        if model is not None and set(model["speed"].values) & set(learned["speed"].values):
+            found["difference"] = figures.learned_minus_model(learned, model)
+    return found
+
+
+def _learned(strides: xr.Dataset) -> xr.Dataset:
+    """The strides of the robots that stayed up and learned something."""
+    taught = (strides["learning"] == 1) & (strides["skipped"] == 0)
+    return figures.stayed_up(strides.isel(speed=np.flatnonzero(taught.any("stride"))))
+
+
+def write_figures(results: Results, folder: Path) -> list[Path]:
+    """Write the figures of the first scenario, and those over all, each as SVG and as PDF.
+
+    Raises:
+        FileProblem: The folder cannot be written, or the result is damaged.
+    """
+    found = scenario_figures(results, results.experiment.scenarios[0])
+    if len(families(results.experiment.scenarios)) > 1:
+        found |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
+    for world in filter(sampled, families(results.experiment.scenarios)):
+        table = sampled_worlds(results.summary(), scenario=world)
+        found[f"{world}-by-world"] = figures.by_world(table)
+    return [
+        save_figure(figure, folder / f"{name}.{suffix}")
+        for name, figure in found.items()
+        for suffix in ("svg", "pdf")
+    ]
+
+
+def _all_worlds(document: Document, results: Results, table: pd.DataFrame) -> None:
+    """What comes out over all worlds: a row a world, the heat map, and the learning."""
+    document.heading("All worlds", "worlds")
+    controllers = set(table.index.get_level_values("controller"))
+    if LEARNER in controllers:
+        document.text("A row a world: peak error under practice (ILC) beside PD and the model.")
+        document.table(report_tables.by_world(table))
+    for name, (figure, caption) in _suite_figures(results, table).items():
+        document.picture(name, figure, caption)
+
+
+def _suite_figures(
+    results: Results, table: pd.DataFrame | None = None
+) -> dict[str, tuple[Figure, str]]:
+    """Figures over all worlds with their captions."""
+    table = answer(results.summary()) if table is None else table
+    return {
+        "heat-map": (
+            figures.heat_map(table),
+            "Mean peak stance error by world and controller, in milliradians.",
+        ),
+        **_practice_figures(results),
+    }
+
+
+def _practice_figures(results: Results) -> dict[str, tuple[Figure, str]]:
+    """Practice over its strides in every world, with captions."""
+    practised: dict[str, list[Practice]] = {}
+    for cell in results.experiment.cells():
+        one = practice(results.strides(cell, VARIABLES))
+        practised.setdefault(family(cell.scenario), []).append(one)
+    ordered = {name: practised[name] for name in families(results.experiment.scenarios)}
+    return {
+        f"practice-{joint}": (
+            figures.practice_curves(ordered, joint=joint),
+            f"The {joint}'s peak error over the strides of learning, with the levels of PD "
+            "and of the model's feedforward; bands from the first to the third quartile.",
+        )
+        for joint in SHOWN
+    }
+
+
+def _world(
+    document: Document, results: Results, summary: pd.DataFrame, table: pd.DataFrame, world: str
+) -> None:
+    """The section about one world; the first one has all figures."""
+    worlds = families(results.experiment.scenarios)
+    drawn = [name for name in results.experiment.scenarios if family(name) == world]
+    where = f"{len(drawn)} sampled worlds" if sampled(world) else "world"
+    document.heading(f'Controllers in the {where} "{world}"', world)
+    if len(worlds) > 1:
+        document.text(verdict(summary, scenario=world, table=table.loc[world]))
+    document.table(report_tables.errors(table.loc[world]))
+    document.table(report_tables.motion(table.loc[world]))
+    units = units_of_intervals(table.loc[world])
+    document.text(f"Intervals are drawn over the {units}." if units else "", "note")
+    if sampled(world):
+        _sampled(document, results, summary, world)
+    if world != worlds[0] or world not in results.experiment.scenarios:
+        return
+    found = scenario_figures(results, world)
+    document.picture("errors", found["errors"], _CAPTIONS["errors"])
+    document.picture("learning", found["learning"], _CAPTIONS["learning"])
+    if {"pd", LEARNER} <= set(results.experiment.controllers):
+        document.heading("Table I, beside the paper's", f"{world}-table", level=3)
+        _beside(document, beside_the_paper(summary, scenario=world), table.loc[world])
+    if LEARNER in results.experiment.controllers:
+        document.heading("Before and after, and what was learned", f"{world}-learned", level=3)
+        if "tracking" not in found:
+            document.text("Nothing to show: no robot stayed up that practice taught something.")
+        for name in ("tracking", "torques", "surface", "difference"):
+            if name in found:
+                document.picture(name, found[name], _CAPTIONS[name])
+
+
+def _beside(document: Document, beside: pd.DataFrame, table: pd.DataFrame) -> None:
+    """Our errors beside the paper's Table I, and who is missing there."""
+    document.text(beside_note(table), "note")
+    if beside.empty:
+        return
+    document.table(report_tables.table_1(beside))
+    document.text(
+        "The last row holds the means of the peaks, and the reduction of the mean (the paper "
+        "prints the mean of its reductions: 75.8 % and 30.8 %).",
+        "note",
+    )
+
+
+def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
+    """The parity table: our model beside the robot of the MJCF that was simulated."""
+    parity, name = foreign.parity, Path(foreign.path).name
+    document.heading(f"The model beside the robot of {name}", "parity")
+    judged = [row for row in parity.rows if row.agrees is not None]
+    document.text(
+        f"Simulated is the robot of `{foreign.path}`, to which the scenarios add. The model, of "
+        f"which the gaits and the feedforward torques are made, is {parity.a}. "
+        f"{len(parity.differences)} of {len(judged)} values differ by more than "
+        f"{parity.tolerance:g} of their size."
+    )
+    masses = [row for row in parity.rows if row.what == "mass"]
+    total = {
+        name: f"{sum(m for m in values if isinstance(m, float)):.4f}"
+        for name, values in (
+            ("model", [row.a for row in masses]),
+            ("simulated", [row.b for row in masses]),
+        )
+    }
+    document.table(pd.DataFrame([total], index=["total mass [kg]"]))
+    if parity.reason:
+        document.text(f"M, h and J are not compared: {parity.reason}.")
+    else:
+        document.table(report_tables.dynamics(parity))
+    if parity.differences:
+        document.text(
+            "Links and joints go by the joint that moves them. An inertia is (xx, yy, zz, xy, xz, "
+            "yz) about the centre of mass, in the trunk's axes at zero joint angles.",
+            "note",
+        )
+        document.table(report_tables.differing(parity.differences), wrap=True)
+    actuators = sorted({str(row.b) for row in parity.rows if row.what == "actuator"} - {"motor"})
+    if actuators:
+        document.text(
+            f"Its actuators ({'; '.join(actuators)}) are played as torque motors.", "note"
+        )
+
+
+def _sampled(document: Document, results: Results, summary: pd.DataFrame, world: str) -> None:
+    """What the worlds of a family are like, and what comes out in each."""
+    table = sampled_worlds(summary, scenario=world)
+    document.heading("World by world", f"{world}-each", level=3)
+    document.picture(f"{world}-by-world", figures.by_world(table), _CAPTIONS["by-world"])
+    document.text(
+        "What is drawn of each world, and the mean peaks in it in milliradians, over the robots "
+        "that did not fall; in the order of the figure."
+    )
+    document.table(report_tables.each_world(table))
+    if len(families(results.experiment.scenarios)) > 1:
+        return  # practice has its figures for all worlds
+    for name, (figure, caption) in _practice_figures(results).items():
+        document.picture(name, figure, caption)
+
+
+def _provenance(document: Document, results: Results) -> None:
+    document.heading("Where these numbers come from", "provenance")
+    document.text(
+        "Made again by this command, to the bit with the same versions, the same BLAS kernel and a "
+        "processor of the same family:"
+    )
+    lines = textwrap.wrap(command(results), 96, break_long_words=False, break_on_hyphens=False)
+    document.text(" \\\n    ".join(lines), "code")
+    document.text(
+        "Every number stands in `summary.csv`, every stride in `strides/`, when they were made and "
+        "how long it took in `provenance.json`."
+    )
+    # However often the run was interrupted: each machine, commit and set of versions once.
+    made: list[dict[str, str]] = []
+    for run in results.provenance["runs"]:
+        found = report_tables.provenance(run)
+        made += [found] if found not in made else []
+    for k, found in enumerate(made, start=1):
+        if len(made) > 1:
+            document.heading(f"Made with, {k} of {len(made)}", f"run-{k}", level=3)
+        document.table(pd.DataFrame.from_dict(found, orient="index", columns=[""]), left=True)
+    seeds = ", ".join(map(str, results.experiment.seeds))
+    if results.foreign is not None:
+        document.text(
+            f"The MJCF is not in this folder; with the files it names it has the SHA-256 "
+            f"`{results.foreign.sha256}`."
+        )
+    document.text(f"Seeds: {seeds}. One stream a seed, the same for every controller.")

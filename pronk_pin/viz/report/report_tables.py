@@ -1,0 +1,146 @@
+"""The report's tables: numbers as texts, with their intervals and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+
+from ...compare.metrics import LEARNER, RIVAL
+from ...compare.report import SHOWN, WORLD, against_model, beat_text, between, number
+from ...parity import Parity, Row, format_value, merged
+from ..figure_style import in_order
+from ..figures import LABELS
+
+
+def by_world(table: pd.DataFrame) -> pd.DataFrame:
+    """One row a world about `ilc`, beside `pd` and `model`, from the table of `answer`."""
+    rows = {}
+    for world, row in table.xs(LEARNER, level="controller").iterrows():
+        cells: dict[str, str] = {}
+        for joint in SHOWN:
+            for other in ("pd", RIVAL):
+                if (world, other) in table.index:
+                    value = table.loc[(world, other), joint]
+                    cells[f"{joint} [rad]: {LABELS[other]}"] = number(value, ".4f")
+            cells[f"{joint} [rad]: ILC"] = _with_interval(row, joint, ".4f")
+        cells["better than model (calf/thigh)"] = against_model(row)
+        cells["strides to beat it"] = beat_text(row)
+        rows[str(world)] = cells
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def _with_interval(row: pd.Series, name: str, form: str) -> str:
+    """A mean with its interval: "0.0224 (0.0216 to 0.0237)"."""
+    value, ends = number(row.get(name, float("nan")), form), between(row, name, form)
+    return value if ends == "-" else f"{value} ({ends})"
+
+
+def dynamics(parity: Parity) -> pd.DataFrame:
+    """How far the equations of motion are apart."""
+    rows = {
+        "mass matrix M": (parity.mass_matrix, "|dM_ij| / sqrt(M_ii M_jj)"),
+        "forces h = H v + G": (parity.bias, "|dh_i| / max |h_i|"),
+        "Jacobian J of the feet": (parity.jacobian, "|dJ_ij| / max |J|"),
+    }
+    return pd.DataFrame.from_dict(
+        {
+            name: ["-" if value is None else f"{value:.2g}", scale]
+            for name, (value, scale) in rows.items()
+        },
+        orient="index",
+        columns=[f"largest on {parity.states} random states", "measured as"],
+    )
+
+
+def differing(differences: Sequence[Row]) -> pd.DataFrame:
+    """Rows of a parity table by quantity, those that say the same of several joints as one."""
+    quantities = list(dict.fromkeys(row.what for row in differences))
+    rows = sorted(merged(differences), key=lambda row: quantities.index(row.what))
+    cells = [
+        {
+            "where": row.where,
+            "model": format_value(row.a),
+            "simulated": format_value(row.b),
+            "difference": number(row.difference, ".3g"),
+        }
+        for row in rows
+    ]
+    units = [f" [{row.unit}]" if row.unit else "" for row in rows]
+    index = [row.what + unit for row, unit in zip(rows, units, strict=True)]
+    return pd.DataFrame(cells, index=index)
+
+
+def each_world(table: pd.DataFrame) -> pd.DataFrame:
+    """The table of `sampled_worlds` as texts."""
+    shown = {}
+    for attribute, (label, factor, form) in WORLD.items():
+        shown[label] = [number(factor * value, form) for value in table["world", attribute]]
+    for joint in SHOWN:
+        for controller in in_order(table[joint].columns):
+            label = f"{joint}: {LABELS.get(controller, controller)}"
+            shown[label] = [number(1e3 * value, ".1f") for value in table[joint, controller]]
+    if table["fallen"].to_numpy().any():
+        for controller in table["fallen"].columns:
+            label = f"fell: {LABELS.get(controller, controller)}"
+            shown[label] = [f"{count:.0f}" for count in table["fallen", controller]]
+    return pd.DataFrame(shown, index=table.index.rename(None))
+
+
+def errors(table: pd.DataFrame) -> pd.DataFrame:
+    """Errors of the controllers in a world, with intervals, from that of `answer`."""
+    rows = {}
+    for name, row in table.iterrows():
+        cells: dict[str, str] = {}
+        for joint in SHOWN:
+            cells[f"{joint}: peak [rad]"] = _with_interval(row, joint, ".4f")
+            cells[f"{joint}: less than PD"] = _with_interval(row, f"{joint}_reduction", ".0%")
+            cells[f"{joint}: wins against model"] = _with_interval(row, f"{joint}_wins", ".0%")
+        rows[LABELS.get(str(name), str(name))] = cells
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def motion(table: pd.DataFrame) -> pd.DataFrame:
+    """What else is to be known of the controllers in a world, from that of `answer`."""
+    rows = {}
+    for name, row in table.iterrows():
+        cells = {f"{joint}: RMS [rad]": number(row[f"{joint}_rms"], ".4f") for joint in SHOWN}
+        cells["better than model (calf/thigh)"] = against_model(row)
+        cells["strides to beat it"] = beat_text(row)
+        cells["strides to converge"] = number(row["strides"], ".0f")
+        cells["feedback's share"] = number(row["feedback"], ".0%")
+        cells["cost of transport"] = number(row["cost"], ".2f")
+        cells["speed error [m/s]"] = number(row["speed_error"], ".3f")
+        cells["apex error [mm]"] = number(1e3 * row["apex_error"], ".1f")
+        cells["upright"] = f"{row['upright']:.0f} of {row['robots']:.0f}"
+        rows[LABELS.get(str(name), str(name))] = cells
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def table_1(table: pd.DataFrame) -> pd.DataFrame:
+    """The table of `beside_the_paper`."""
+    shown = table.copy().astype(object)
+    for column in table.columns:
+        form = ".0%" if column[2] == "reduction" else ".3f"
+        shown[column] = [number(value, form) for value in table[column]]
+    names = {"ours": "this run", "paper": "paper"}
+    shown.columns = pd.MultiIndex.from_tuples(
+        [(f"{joint} [rad]", names[source], name) for joint, source, name in shown.columns]
+    )
+    shown.index = pd.Index([s if isinstance(s, str) else f"{s:g}" for s in table.index])
+    return shown
+
+
+def provenance(run: dict[str, Any]) -> dict[str, str]:
+    """What a result was made with: a run of `Results.provenance`.
+
+    When, how fast and by how many workers is not in it: the report is the same each time.
+    """
+    return {
+        "versions": ", ".join(f"{name} {version}" for name, version in run["versions"].items()),
+        "source": run["git"] or "not under version control",
+        "Python": run["python"],
+        "system": run["platform"],
+        "CPU": f"{run['cpu']} ({run['cores']} cores)",
+    }

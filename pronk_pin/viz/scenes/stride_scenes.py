@@ -1,0 +1,332 @@
+"""Scenes from results: robots as they were simulated, each beside its reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+from ..._checks import instance_of, none_or, real, whole
+from ..._typing import Array, BoolArray
+from ...compare import Results, load_scenario
+from ...errors import InvalidInput
+from ...gait import Gait, load_library
+from ...robot import Robot, load_robot
+from ..figure_style import look
+from .gait_scenes import SHOWN_SPEED, nearest, numbers
+from .menu import Choice, Programme
+from .scene import SECOND_COLOR, Mark, Scene, Track
+
+BEFORE, AFTER = 3, 9
+"""Strides of a window before and after the learning is switched on."""
+
+WINDOW = BEFORE + AFTER
+"""Strides that are shown together."""
+
+FORCE_WINDOW = 1.0 / 60.0
+"""Time over which forces are averaged [s]: a frame of the page."""
+
+ASIDE = 0.55
+"""Distance of a second robot from the first [m]."""
+
+START, LAST = "around the start of learning", "the last ones"
+ALONE, EARLIER = "nothing", "before learning"
+
+SPEED, CONTROLLER, SCENARIO = "speed [m/s]", "controller", "scenario"
+BESIDE, STRIDES = "beside it", "strides"
+"""The options of the page, in their order."""
+
+
+def practice_programme(
+    results: Results,
+    *,
+    speed: float | None = None,
+    controller: str | None = None,
+    scenario: str | None = None,
+    beside: str | None = None,
+    stride: int | None = None,
+) -> Programme:
+    """The robots of a result, to choose from by speed, controller, scenario and strides.
+
+    Args:
+        results: The results folder.
+        speed: Desired speed shown first [m/s]; by default the one nearest to 0.5.
+        controller: Controller shown first; by default "ilc", or the first there is.
+        scenario: Scenario shown first; by default the first.
+        beside: What runs beside it: a controller, "before learning" for its own strides before
+            the learning was switched on, or "nothing", the default.
+        stride: Show the dozen strides with this one first; by default those around the start of
+            learning, or the last ones where nothing was learned.
+
+    Raises:
+        InvalidInput: The result holds no such speed, controller, scenario or stride.
+    """
+    speed, stride = none_or(real, "speed", speed), none_or(whole, "stride", stride)
+    experiment = instance_of("results", results, Results).experiment
+    speeds, controllers = list(experiment.speeds), list(experiment.controllers)
+    if controller is None:
+        controller = "ilc" if "ilc" in controllers else controllers[0]
+    scenario = experiment.scenarios[0] if scenario is None else scenario
+    strides = results.all_strides(controller=controller, scenario=scenario)
+    windows = _windows(strides)
+    if speed is not None:
+        at = nearest(speeds, speed, "speed")
+    else:  # of those that have something to show
+        distance = np.abs(np.asarray(speeds) - SHOWN_SPEED)
+        at = int(np.argmin(np.where(strides["count"] > 0, distance, np.inf)))
+    reader = _Reader(results)
+    first = {
+        SPEED: f"{speeds[at]:g}",
+        CONTROLLER: controller,
+        SCENARIO: scenario,
+        BESIDE: ALONE if beside is None else beside,
+        STRIDES: windows[0] if stride is None else _window_of(windows, stride),
+    }
+    options = {
+        SPEED: numbers(speeds),
+        CONTROLLER: controllers,
+        SCENARIO: list(experiment.scenarios),
+        BESIDE: [ALONE, EARLIER, *controllers],
+        STRIDES: windows,
+    }
+    filed = {STRIDES: windows[:2], SPEED: options[SPEED], BESIDE: [ALONE, EARLIER]}
+    if START not in windows:
+        filed = {SPEED: options[SPEED]}
+    return Programme(reader.scene, options, first, filed)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Makes the scenes of a result."""
+
+    results: Results
+
+    def scene(self, choice: Choice) -> Scene:
+        """The scene of a choice."""
+        speed, scenario = float(choice[SPEED]), choice[SCENARIO]
+        experiment = self.results.experiment
+        robot, base = load_robot(experiment.robot), experiment.base
+        # As the experiment does: of a trunk that may turn, the gaits that let it pitch.
+        library = load_library(robot.name, base=None if base == "locked" else "sagittal")
+        gait = library.at(speed)
+        strides = self._strides(choice[CONTROLLER], scenario, speed)
+        shown = _cut(strides, choice[STRIDES])
+        tracks = [*_pair(robot, gait, shown, look(choice[CONTROLLER]).label)]
+        if choice[BESIDE] != ALONE:
+            second = strides if choice[BESIDE] == EARLIER else None
+            if second is None:
+                second = self._strides(choice[BESIDE], scenario, speed)
+                label = f"{look(choice[BESIDE]).label}, beside"
+                cut = _cut(second, choice[STRIDES])
+            else:
+                label, cut = "before learning", _cut_before(second)
+            pair = _pair(robot, gait, cut, label)
+            tracks += [replace(track.moved(y=ASIDE), color=_beside(track)) for track in pair]
+        learned = shown["start"].to_numpy()[shown["learning"].to_numpy() == 1]
+        began = float(learned[0] - shown["start"][0]) if learned.size else 0.0
+        note = f"; learning starts after {began:.1f} s" if began > 0.0 else ""
+        note += "; the robot fell" if bool((shown["upright"] == 0).any()) else ""
+        return Scene(
+            robot,
+            tracks,
+            force_window=FORCE_WINDOW,
+            title=f"{robot.name.upper()} pronking at {speed:g} m/s",
+            caption=f"scenario {scenario}, strides {choice[STRIDES]}{note}",
+            friction=load_scenario(scenario).ground_friction,
+        )
+
+    def _strides(self, controller: str, scenario: str, speed: float) -> xr.Dataset:
+        """The strides of one robot."""
+        digest = self.results.strides_digest
+        strides = _load(self.results, controller, scenario, digest)
+        return strides.isel(speed=nearest(list(strides["speed"].to_numpy()), speed, "speed"))
+
+
+@lru_cache(maxsize=8)
+def _load(results: Results, controller: str, scenario: str, digest: str) -> xr.Dataset:
+    """Strides that are kept as long as the files, by their `digest`, are the same."""
+    return results.all_strides(controller=controller, scenario=scenario)
+
+
+def _beside(track: Track) -> tuple[float, float, float] | None:
+    return None if track.ghost else SECOND_COLOR
+
+
+def _windows(strides: xr.Dataset) -> list[str]:
+    """Windows of strides that the page offers."""
+    count = int(strides["count"].max())
+    learned = bool((strides["learning"] == 1).any())
+    starts = range(0, max(count - WINDOW, 0) + 1, WINDOW)
+    named = [START, LAST] if learned else [LAST]
+    return [*named, *(f"from {first} on" for first in starts)]
+
+
+def _window_of(windows: list[str], stride: int) -> str:
+    """The window in the list that a stride is in."""
+    starts = [int(text.split()[1]) for text in windows if text.startswith("from ")]
+    if not 0 <= stride < starts[-1] + WINDOW:
+        raise InvalidInput(
+            f"there is no stride {stride}; choose one from 0 to {starts[-1] + WINDOW - 1}"
+        )
+    return f"from {max(first for first in starts if first <= stride)} on"
+
+
+def _cut(strides: xr.Dataset, window: str) -> xr.Dataset:
+    """The strides of a window of one robot."""
+    count = int(strides["count"])
+    if count == 0:
+        raise InvalidInput(
+            f"no stride was finished at {float(strides['speed']):g} m/s; choose another speed"
+        )
+    first = max(count - WINDOW, 0)
+    if window == START:
+        learning = np.flatnonzero(strides["learning"].to_numpy()[:count] == 1)
+        first = max(int(learning[0]) - BEFORE, 0) if learning.size else first
+    elif window != LAST:
+        first = int(window.split()[1])
+        if first >= count:
+            raise InvalidInput(f"this robot finished {count} strides only; choose earlier ones")
+    return strides.isel(stride=slice(first, min(first + WINDOW, count)))
+
+
+def _cut_before(strides: xr.Dataset) -> xr.Dataset:
+    """The last strides of one robot before the learning was switched on."""
+    count = int(strides["count"])
+    learning = np.flatnonzero(strides["learning"].to_numpy()[:count] == 1)
+    end = int(learning[0]) if learning.size else 0
+    if end == 0:
+        raise InvalidInput("this robot has no strides before learning; choose another")
+    return strides.isel(stride=slice(max(end - WINDOW, 0), end))
+
+
+def _pair(robot: Robot, gait: Gait, strides: xr.Dataset, name: str) -> tuple[Track, Track]:
+    """A robot as simulated, and its reference, both from time 0 and place 0 on."""
+    strides = strides.assign(start=strides["start"] - strides["start"][0])
+    measured, planned = _measured(robot, strides, name), _planned(robot, strides, gait, name)
+    x = -float(measured.q[0, 0])
+    return measured.moved(x), planned.moved(x)
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Times of the samples of some strides: on the phase grid, as far as each part lasted.
+
+    Attributes:
+        since: Times since the beginning of the part [s], shape (strides, 2, samples).
+        begin: When the parts begin [s], shape (strides, 2, 1).
+        within: Which samples there are, shape (strides, 2, samples).
+    """
+
+    since: Array
+    begin: Array
+    within: BoolArray
+
+    @classmethod
+    def of(cls, strides: xr.Dataset) -> _Samples:
+        """Those of the strides of one robot."""
+        start, stance, whole = (strides[key].to_numpy() for key in ("start", "stance", "duration"))
+        begin = np.stack([start, start + stance], axis=1)[..., None]
+        length = np.stack([stance, whole - stance], axis=1)[..., None]
+        planned = strides["planned_duration"].to_numpy()[:, None]  # (2, 1)
+        since = np.broadcast_to(
+            strides["phase"].to_numpy() * planned, (len(start), 2, strides.sizes["phase"])
+        )
+        return cls(since, begin, since < length - 1e-9)
+
+    @property
+    def times(self) -> Array:
+        """The times of all samples, one after the other [s], shape (m,)."""
+        return np.asarray((self.begin + self.since)[self.within])
+
+    def curve(self, strides: xr.Dataset, name: str) -> Array:
+        """A curve at all samples, one after the other, shape (m, ...)."""
+        values = strides[name].transpose(*_order(strides[name]), ...).to_numpy()
+        if "stride" not in strides[name].dims:
+            values = np.broadcast_to(values, (len(self.since), *values.shape))
+        return np.asarray(values[self.within], dtype=float)
+
+    def forces(self, strides: xr.Dataset) -> Array | None:
+        """Forces of the ground [N], shape (m, 4, 3), each the mean over `FORCE_WINDOW` before.
+
+        They are kept for the last strides only, tick by tick: NaN elsewhere, None if these are all
+        others. A touchdown is one tick of thousands of newtons; a mean keeps its impulse, where a
+        sample would miss it.
+        """
+        last = strides["stride"].to_numpy() - (int(strides["count"]) - strides.sizes["last"])
+        shown = np.flatnonzero(last >= 0)
+        if not shown.size:
+            return None
+        kept = strides["tick_force"].isel(last=last[shown])
+        ticks = kept.transpose("last", "part", "tick", "foot", ...).to_numpy()
+        ticks = ticks[np.isfinite(ticks).all(axis=(-2, -1))]  # (ticks, 4, 3), one after the other
+        timestep = float(strides.attrs["timestep"])
+        impulse = np.concatenate([np.zeros((1, 12)), np.cumsum(ticks.reshape(-1, 12), axis=0)])
+        impulse *= timestep
+        begin = float(self.begin[shown[0], 0, 0])
+        clock = begin + timestep * np.arange(len(impulse))
+        times = self.times
+        before = np.maximum(times - FORCE_WINDOW, begin)
+        impulses = [
+            np.interp(times, clock, column) - np.interp(before, clock, column)
+            for column in impulse.T
+        ]
+        span = np.maximum(times - before, timestep)
+        forces = np.where(times < begin, np.nan, np.array(impulses) / span).T
+        return np.asarray(forces.reshape(len(times), 4, 3))
+
+
+def _order(curve: xr.DataArray) -> list[str]:
+    return [name for name in ("stride", "part", "phase") if name in curve.dims]
+
+
+def _measured(robot: Robot, strides: xr.Dataset, name: str) -> Track:
+    """The robot as simulated."""
+    samples = _Samples.of(strides)
+    error = samples.curve(strides, "error")
+    joints = samples.curve(strides, "reference") - error
+    torque = samples.curve(strides, "feedback") + samples.curve(strides, "feedforward")
+    return Track(
+        name,
+        samples.times,
+        _configurations(
+            robot, samples.curve(strides, "base"), joints, samples.curve(strides, "attitude")
+        ),
+        error=error,
+        torque=np.clip(torque, -robot.tau_max, robot.tau_max),
+        forces=samples.forces(strides),
+        marks=[
+            Mark(float(begin), int(number), str(part))
+            for number, begins in zip(strides["stride"], samples.begin[..., 0], strict=True)
+            for part, begin in zip(strides["part"].to_numpy(), begins, strict=True)
+        ],
+    )
+
+
+def _planned(robot: Robot, strides: xr.Dataset, gait: Gait, name: str) -> Track:
+    """The gait, put down where the robot touches down at the beginning of each stride."""
+    samples = _Samples.of(strides)
+    place = strides["base"].isel(part=0, phase=0, axis=0).to_numpy()  # (strides,)
+    s = strides["phase"].to_numpy()
+    base = np.stack([phase.base_reference(s)[0] for phase in (gait.stance, gait.flight)])
+    moved = np.repeat(base[None], len(place), axis=0)  # (strides, 2, samples, 3): x, z, pitch
+    moved[..., 0] += place[:, None, None]
+    x_z_pitch = moved[samples.within]
+    attitude = np.zeros_like(x_z_pitch)
+    attitude[:, 1] = x_z_pitch[:, 2]
+    joints = samples.curve(strides, "reference")
+    q = _configurations(robot, x_z_pitch[:, :2], joints, attitude)
+    return Track(f"reference of {name}", samples.times, q, ghost=True)
+
+
+def _configurations(robot: Robot, base: Array, joints: Array, attitude: Array) -> Array:
+    """Configurations (n, 19) from the trunk's x and z, its roll, pitch and heading, and the joints.
+
+    Where the trunk drifts sideways is not kept, and is left out.
+    """
+    xyz = np.column_stack([base[:, 0], np.zeros(len(base)), base[:, 1]])
+    q = robot.q_from_base(xyz, joints)
+    q[:, 3:7] = Rotation.from_euler("ZYX", attitude[:, ::-1]).as_quat()
+    return q

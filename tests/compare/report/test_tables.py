@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pronk_pin.compare import random_scenarios
+from pronk_pin.compare.report.tables import (
+    answer,
+    beside_the_paper,
+    overview,
+    sampled_worlds,
+    worst_reduction,
+)
+
+
+def test_our_errors_stand_beside_the_papers_at_the_same_speed(summary: pd.DataFrame) -> None:
+    table = beside_the_paper(summary, scenario="nominal")
+    assert table.index.tolist() == [0.3, 0.35, "mean"]
+    assert table.loc[0.3, ("calf", "ours")].tolist() == pytest.approx([0.10, 0.02, 0.8])
+    assert table.loc[0.3, ("calf", "paper", "PD")] == 0.089
+    assert np.isnan(table.loc[0.35, ("calf", "paper", "PD")])
+    assert table.loc["mean", ("thigh", "ours")].tolist() == pytest.approx([0.075, 0.015, 0.8])
+
+
+def test_the_overview_has_means_reductions_and_the_slowest_speed(summary: pd.DataFrame) -> None:
+    table = overview(summary, scenario="nominal")
+    assert list(table.index) == ["pd", "model", "ilc"]
+    ilc = table.loc["ilc"]
+    assert ilc["calf"] == pytest.approx(0.03)
+    assert ilc["calf_reduction"] == pytest.approx(0.8)
+    assert ilc["strides"] == 8.0
+    assert ilc["speed_error"] == pytest.approx(0.05)  # magnitudes do not cancel
+    assert (ilc["upright"], ilc["robots"]) == (2, 2)
+
+
+def test_the_worst_reduction_is_that_of_the_worst_speed(summary: pd.DataFrame) -> None:
+    worse = (summary["controller"] == "ilc") & (summary["speed"] == 0.35)
+    worse &= (summary["metric"] == "peak_error") & (summary["joint"] == "calf")
+    summary.loc[worse, "value"] = 0.3
+    worst = worst_reduction(summary, scenario="nominal", controller="ilc")
+    assert worst["calf"] == pytest.approx(-0.5)
+    assert worst["thigh"] == pytest.approx(0.8)
+
+
+def test_one_speed_that_never_settles_is_not_hidden_by_the_others(summary: pd.DataFrame) -> None:
+    settled = summary["metric"] == "strides_to_converge"
+    summary.loc[summary[settled].index[0], "value"] = np.nan
+    assert np.isnan(overview(summary, scenario="nominal").loc["ilc", "strides"])
+
+
+def test_means_and_reductions_have_intervals_that_hold_them(summary: pd.DataFrame) -> None:
+    table = overview(summary, scenario="nominal")
+    for name in ("calf", "thigh", "calf_reduction"):
+        ilc = table.loc["ilc"]
+        assert ilc[f"{name}_low"] - 1e-12 <= ilc[name] <= ilc[f"{name}_high"] + 1e-12
+    assert np.isnan(table.loc["pd", "calf_reduction"])
+    assert set(table["unit"]) == {"speed"}
+
+
+def test_who_beats_the_model_is_counted_robot_by_robot(summary: pd.DataFrame) -> None:
+    ilc = overview(summary, scenario="nominal").loc["ilc"]
+    assert (ilc["calf_model"], ilc["thigh_model"]) == (1, -1)
+    assert (ilc["calf_wins"], ilc["thigh_wins"]) == (1.0, 0.0)
+    assert ilc["calf_difference"] == pytest.approx(-0.015)
+    assert ilc["calf_wins_low"] < 0.5  # two robots prove little
+    assert (ilc["beat_strides"], ilc["beat"], ilc["learners"]) == (3.0, 1, 2)
+
+
+def test_robots_that_fell_are_counted_and_not_averaged(summary: pd.DataFrame) -> None:
+    down = (summary["controller"] == "ilc") & (summary["speed"] == 0.35)
+    summary.loc[down & (summary["metric"] == "upright"), "value"] = 0.0
+    ilc = overview(summary, scenario="nominal").loc["ilc"]
+    assert (ilc["upright"], ilc["robots"]) == (1, 2)
+    assert ilc["calf"] == pytest.approx(0.02)
+
+
+def test_the_answer_has_every_world_and_sampled_ones_as_one(summary: pd.DataFrame) -> None:
+    sampled = [summary.assign(scenario=f"random-4-{k}") for k in range(5)]
+    table = answer(pd.concat([summary, *sampled]))
+    assert list(table.index.get_level_values("scenario").unique()) == ["nominal", "random-4"]
+    assert table.loc[("random-4", "ilc"), "robots"] == 10
+    assert table.loc[("random-4", "ilc"), "unit"] == "world"
+
+
+def test_each_sampled_world_stands_beside_what_it_is_like(summary: pd.DataFrame) -> None:
+    down = (summary["controller"] == "ilc") & (summary["metric"] == "upright")
+    worlds = []
+    for k, factor in ((0, 3.0), (1, 1.0)):
+        mine = summary.assign(scenario=f"random-4-{k}")
+        mine.loc[mine["metric"] == "peak_error", "value"] *= factor
+        worlds.append(mine)
+    worlds[0].loc[worlds[0][down & (worlds[0]["speed"] == 0.35)].index, "value"] = 0.0
+    table = sampled_worlds(pd.concat(worlds, ignore_index=True), scenario="random-4")
+    assert table.index.tolist() == ["random-4-1", "random-4-0"]  # by what practice leaves
+    for k, world in enumerate(random_scenarios(2, seed=4)):
+        assert table.loc[f"random-4-{k}", ("world", "payload")] == world.payload
+    assert table.loc["random-4-1", ("calf", "ilc")] == pytest.approx(0.03)
+    assert table.loc["random-4-0", ("calf", "ilc")] == pytest.approx(0.06)  # one fell
+    assert table.loc["random-4-0", ("thigh", "pd")] == pytest.approx(3 * 0.075)
+    assert table["fallen", "ilc"].tolist() == [0, 1]
+    assert table["fallen", "pd"].tolist() == [0, 0]

@@ -1,0 +1,138 @@
+"""Pictures and films need no display, and say clearly what they need."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pronk_pin.errors import FileProblem, InvalidInput, NoBrowser
+from pronk_pin.viz import Film, Scene, write_film, write_png
+from pronk_pin.viz.player.browser import VARIABLE
+
+if TYPE_CHECKING:
+    from conftest import Eye
+
+PROGRAM = """
+import sys, time
+from pronk_pin.viz.player.browser import Browser
+browser = Browser()
+print(browser._process.pid, flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.mark.browser
+def test_a_picture_shows_the_moment_asked_for(scene: Scene, browser: Eye, tmp_path: Path) -> None:
+    film = Film(width=480, height=360)
+    pushing = write_png(scene, tmp_path / "new" / "a.png", film)
+    flying = write_png(scene, tmp_path / "b.png", Film(width=480, height=360, at=0.3))
+    pictures = [
+        np.asarray(Image.open(path).convert("RGB")).astype(int) for path in (pushing, flying)
+    ]
+    assert pictures[0].shape == (360, 480, 3)
+    assert np.sum(np.abs(pictures[0] - pictures[1]).max(axis=-1) > 40) > 2_000
+
+
+@pytest.mark.browser
+def test_an_animation_and_a_video_have_the_frames_asked_for(
+    scene: Scene, browser: Eye, tmp_path: Path
+) -> None:
+    film = Film(width=240, height=180, fps=20.0, rate=0.5, seconds=0.2)
+    gif = write_film(scene, tmp_path / "hop.gif", film, progress=False)
+    with Image.open(gif) as animation:
+        assert (animation.n_frames, animation.size) == (8, (240, 180))
+        assert animation.info["duration"] == 50
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    mp4 = write_film(scene, tmp_path / "hop.mp4", film, progress=False)
+    assert ffmpeg.count_frames_and_secs(str(mp4)) == (8, pytest.approx(0.4))
+
+
+@pytest.mark.browser
+def test_a_killed_program_leaves_no_browser(browser: Eye) -> None:
+    process = subprocess.Popen([sys.executable, "-c", PROGRAM], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    pid = int(process.stdout.readline())
+    os.kill(pid, 0)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    for _ in range(100):
+        if not alive(pid):
+            return
+        time.sleep(0.1)
+    raise AssertionError("the browser is still there")
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that has ended but was not waited for does not."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def test_without_a_browser_it_says_what_to_install(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("pronk_pin.viz.player.browser._NAMES", ("no-such-browser",))
+    with pytest.raises(NoBrowser, match=r"none is installed; install one .*apt install chromium"):
+        write_png(scene, tmp_path / "a.png")
+    monkeypatch.setenv(VARIABLE, "no-such-browser")
+    with pytest.raises(NoBrowser, match="PRONK_PIN_BROWSER=no-such-browser is no program"):
+        write_png(scene, tmp_path / "a.png")
+
+
+def test_a_browser_that_ends_at_once_is_told(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(VARIABLE, "false")
+    with pytest.raises(NoBrowser, match="false ended"):
+        write_png(scene, tmp_path / "a.png")
+
+
+def test_without_an_encoder_it_says_what_to_install(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(InvalidInput, match=r"pip install pronk-pin\[video\]', or write a .gif"):
+        write_film(scene, tmp_path / "a.mp4")
+
+
+def test_a_path_is_looked_at_before_anything_is_drawn(scene: Scene, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match=r"as .gif or .mp4, not as 'a.avi'"):
+        write_film(scene, tmp_path / "a.avi")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FileProblem, match="choose another path"):
+        write_png(scene, tmp_path / "file" / "a.png")
+
+
+def test_slow_motion_and_pieces() -> None:
+    assert Film(fps=10.0, rate=0.5, at=1.0, seconds=0.2).times(5.0) == pytest.approx(
+        [1.0, 1.05, 1.1, 1.15]
+    )
+    assert len(Film(fps=10.0).times(5.0)) == 50
+    assert Film(at=9.0).times(5.0) == [9.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"fps": 0.0}, "fps must be positive"),
+        ({"width": 301}, "even number of pixels"),
+        ({"color": "mass"}, "choose error or torque"),
+        ({"at": -1.0}, "at must not be negative"),
+    ],
+)
+def test_a_film_refuses_what_cannot_be(change: dict[str, float], message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        Film(**change)  # type: ignore[arg-type]

@@ -1,0 +1,181 @@
+"""What a scene shows is what Pinocchio's kinematics says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pronk_pin.errors import InvalidInput
+from pronk_pin.gait import Gait, GaitPhase
+from pronk_pin.kinematics import foot_positions
+from pronk_pin.robot import Robot, load_robot
+from pronk_pin.viz import Scene, Track, gait_scene
+from pronk_pin.viz.scenes.meshes import Appearance, Mesh, appearance, grid_faces, sphere, thin
+
+
+def some_motion(robot: Robot, n: int = 40) -> np.ndarray:
+    """Configurations with every degree of freedom moved, shape (n, 19)."""
+    rng = np.random.default_rng(5)
+    ends = [pin.integrate(robot.model, robot.standing, rng.uniform(-0.5, 0.5, 18)) for _ in "ab"]
+    return np.stack([pin.interpolate(robot.model, *ends, w) for w in np.linspace(0, 1, n)])
+
+
+def placed(look: Appearance, q: np.ndarray) -> dict[str, np.ndarray]:
+    """Poses of the parts as the page computes them: down the tree of joints, in plain algebra."""
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_quat(q[3:7]).as_matrix()
+    base[:3, 3] = q[:3]
+    poses = [np.eye(4), base]
+    for angle, joint in zip(q[7:], look.joints, strict=True):
+        turn = np.eye(4)
+        turn[:3, :3] = Rotation.from_rotvec(angle * joint.axis).as_matrix()
+        poses.append(poses[joint.parent] @ joint.placement @ turn)
+    return {part.name: poses[part.joint] @ part.placement for part in look.parts}
+
+
+@pytest.mark.parametrize("name", ["a1", "go2", "solo12"])
+def test_links_are_where_pinocchio_puts_them(name: str) -> None:
+    robot = load_robot(name)
+    look, data = appearance(robot), robot.model.createData()
+    visuals = pin.buildGeomFromUrdf(
+        robot.model,
+        str(robot.urdf_path),
+        pin.GeometryType.VISUAL,
+        package_dirs=[str(robot.package_dir)],
+    )
+    places = visuals.createData()
+    q = some_motion(robot)[13]
+    pin.updateGeometryPlacements(robot.model, data, visuals, places, q)
+    for part, pose in placed(look, q).items():
+        expected = places.oMg[visuals.getGeometryId(part)].homogeneous
+        np.testing.assert_allclose(pose, expected, atol=1e-12)
+    feet = look.feet(q[None])[0]
+    np.testing.assert_allclose(feet, foot_positions(robot, q), atol=1e-12)
+
+
+def test_every_leg_is_shown_in_four_parts(scene: Scene) -> None:
+    names = {part.name for part in scene.appearance.parts}
+    parts = {
+        f"{leg}_{part}_0" for leg in scene.robot.legs for part in ("hip", "thigh", "calf", "foot")
+    }
+    assert names == parts | {"trunk_0"}
+
+
+def test_a_steady_run_stays_in_place_while_the_ground_scrolls(scene: Scene) -> None:
+    times = np.array([0.0, 1.3, 4.9])
+    robot, reference = scene.rows(times)
+    view = scene.view(times)
+    np.testing.assert_allclose(view, np.stack([0.5 * times, 0.0 * times], axis=1), atol=1e-6)
+    np.testing.assert_allclose(robot["q"][:, 0] - view[:, 0], 0.0, atol=1e-6)
+    np.testing.assert_allclose(reference["q"][:, 0] - view[:, 0], -0.1, atol=1e-6)
+
+
+def test_two_robots_stand_on_both_sides_of_the_middle(robot: Robot, hop: Track) -> None:
+    second = replace(hop.moved(y=0.6), name="second")
+    assert Scene(robot, (hop, second)).view(np.zeros(1))[0, 1] == pytest.approx(0.3)
+
+
+def test_samples_are_shown_as_they_are(hop: Track) -> None:
+    row = hop.at(hop.t[[12, 77]])
+    for name in ("q", "forces", "error", "torque"):
+        values = getattr(hop, name)[[12, 77]].reshape(2, -1)
+        np.testing.assert_allclose(row[name], values, atol=1e-12)
+
+
+def test_between_samples_a_track_turns_the_short_way(robot: Robot) -> None:
+    q = np.tile(robot.standing, (2, 1))
+    q[1, 3:7] = -pin.Quaternion(pin.utils.rpyToMatrix(0.0, 0.0, 0.2)).coeffs()
+    track = Track("robot", np.array([1.0, 2.0]), q)
+    half = pin.Quaternion(track.at(np.array([1.5]))["q"][0, 3:7]).toRotationMatrix()
+    np.testing.assert_allclose(half, pin.utils.rpyToMatrix(0.0, 0.0, 0.1), atol=1e-12)
+
+
+def test_a_track_holds_its_ends(hop: Track) -> None:
+    ends = hop.at(np.array([-1.0, 99.0]))["q"]
+    np.testing.assert_allclose(ends, hop.q[[0, -1]], atol=1e-12)
+
+
+def test_one_posture_is_a_scene(robot: Robot) -> None:
+    scene = Scene(robot, (Track("robot", np.zeros(1), robot.standing[None]),))
+    assert scene.times(60.0).tolist() == [0.0]
+    np.testing.assert_allclose(scene.rows(scene.times(60.0))[0]["q"], robot.standing[None])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"q": np.zeros((3, 18))}, r"q is of shape \(3, 18\), not \(3, 19\)"),
+        ({"t": np.array([0.0, 1.0, 1.0])}, "t must increase"),
+        ({"forces": np.zeros((3, 4))}, r"forces is of shape \(3, 4\), not \(3, 4, 3\)"),
+        ({"q": np.full((3, 19), np.nan)}, "q holds NaN"),
+        ({"torque": np.zeros((2, 12))}, r"torque is of shape \(2, 12\), not \(3, 12\)"),
+        ({"name": ""}, "needs a name"),
+    ],
+)
+def test_a_scene_refuses_what_it_cannot_show(
+    robot: Robot, change: dict[str, object], message: str
+) -> None:
+    good = {"name": "robot", "t": np.arange(3.0), "q": np.tile(robot.standing, (3, 1))}
+    with pytest.raises(InvalidInput, match=message):
+        Scene(robot, (Track(**(good | change)),))  # type: ignore[arg-type]
+
+
+def test_tracks_of_one_name_are_refused(robot: Robot, hop: Track) -> None:
+    with pytest.raises(InvalidInput, match="different names"):
+        Scene(robot, (hop, hop))
+
+
+def test_a_gait_runs_on_over_its_strides(robot: Robot) -> None:
+    joints = np.repeat(robot.standing[7:, None], 2, axis=1)
+    phases = []
+    for name, feet, duration, x in (
+        ("stance", robot.legs, 0.2, (0.0, 0.1)),
+        ("flight", (), 0.2, (0.1, 0.2)),
+    ):
+        lam = np.zeros((4, 3, 2))
+        lam[:, 2] = 60.0 if feet else 0.0
+        base = np.array([x, (0.3, 0.3), (0.0, 0.0)])
+        phases.append(GaitPhase(name, feet, duration, joints, base, np.zeros((12, 2)), lam))
+    scene = gait_scene(robot, Gait("a1", 0.5, 0.3, tuple(phases)), strides=3, dt=0.01)
+    track = scene.tracks[0]
+    assert scene.duration == pytest.approx(3 * 0.4, abs=0.011)
+    np.testing.assert_allclose(track.q[:, 0], 0.5 * track.t, atol=1e-12)
+    assert track.forces is not None
+    standing = track.forces[:, 0, 2] > 0.0
+    np.testing.assert_array_equal(standing, (track.t + 1e-9) % 0.4 < 0.2)
+    assert [(mark.stride, mark.phase) for mark in track.marks[:3]] == [
+        (0, "stance"),
+        (0, "flight"),
+        (1, "stance"),
+    ]
+    assert [mark.t for mark in track.marks[:3]] == pytest.approx([0.0, 0.2, 0.4])
+
+
+def test_thinning_keeps_surfaces_round() -> None:
+    fine = sphere(0.1, segments=200)
+    coarse = thin(fine, cell=0.01)
+    assert len(coarse.faces) < 0.1 * len(fine.faces)
+    np.testing.assert_allclose(np.linalg.norm(coarse.vertices, axis=1), 0.1, atol=1e-3)
+
+
+def test_thinning_keeps_corners_sharp() -> None:
+    # Three faces of a cube that meet in the origin, each a fine grid.
+    u, v = (x.reshape(-1) for x in np.meshgrid(np.linspace(0, 0.1, 51), np.linspace(0, 0.1, 51)))
+    zero = np.zeros_like(u)
+    quads = grid_faces(51, 51)
+    sides = [np.stack(axes, axis=-1) for axes in ((u, v, zero), (zero, u, v), (v, zero, u))]
+    faces = np.concatenate([quads + k * len(u) for k in range(3)])
+    coarse = thin(Mesh(np.concatenate(sides), faces), cell=0.013)
+    assert np.linalg.norm(coarse.vertices, axis=1).min() < 5e-4
+    assert np.abs(coarse.vertices).min(axis=1).max() < 5e-4
+
+
+def test_the_robot_is_light_and_keeps_its_size(scene: Scene) -> None:
+    parts = {part.name: part for part in scene.appearance.parts}
+    assert sum(len(part.mesh.faces) for part in parts.values()) < 40_000
+    extent = np.ptp(parts["trunk_0"].mesh.vertices, axis=0)
+    np.testing.assert_allclose(extent, [0.414, 0.194, 0.117], atol=2e-3)
