@@ -11,24 +11,19 @@ if TYPE_CHECKING:
 __all__ = ["ModelParameters", "PronkError", "Robot", "RobotSpec", "load_robot"]
 __version__ = "0.1.0"
 
-_HOMES = {
-    "ModelParameters": "parameters",
-    "Robot": "robot",
-    "RobotSpec": "robot",
-    "load_robot": "robot",
-}
-"""Where names are that are imported when they are first asked for (PEP 562): a worker process
+_LATER = tuple(name for name in __all__ if name != "PronkError")
+"""Names of `robot`, which is imported when they are first asked for (PEP 562): a worker process
 watches its parent before it imports NumPy, Pinocchio and MuJoCo, which takes seconds."""
 
 if not TYPE_CHECKING:  # or every name would seem to exist
 
     def __getattr__(name: str) -> object:
-        if name not in _HOMES:
+        if name not in _LATER:
             raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-        found = getattr(importlib.import_module(f".{_HOMES[name]}", __name__), name)
+        found = getattr(importlib.import_module(".robot", __name__), name)
         globals()[name] = found
         return found
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOMES})
+    return sorted({*globals(), *_LATER})

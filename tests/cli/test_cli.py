@@ -218,7 +218,10 @@ def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixt
         (["gaits", "build", "--base", "free"], "unknown base 'free'; choose one of: locked"),
         (["gaits", "build", "--workers", "0"], "at least one is needed"),
         (["gaits", "show", "0.1", "--apex", "0.5"], "which covers 0.32 to 0.36 m"),
-        (["gaits", "show", "--robot", "solo12"], "solo12.npz: missing; make it again"),
+        (
+            ["gaits", "show", "--robot", "solo12"],
+            "solo12.npz: no such gait library is shipped",
+        ),
         (["gaits", "plot", "--format", "bmp"], "choose png, svg, pdf"),
         (["gaits", "plot", "--apex", "0.5"], "no apex 0.5; choose one of: 0.32, 0.34, 0.36"),
     ],

@@ -70,11 +70,10 @@ def practice_programme(
     if controller is None:
         controller = "ilc" if "ilc" in controllers else controllers[0]
     scenario = experiment.scenarios[0] if scenario is None else scenario
+    at = None if speed is None else nearest(speeds, speed, "speed")
     strides = results.all_strides(controller=controller, scenario=scenario)
     windows = _windows(strides)
-    if speed is not None:
-        at = nearest(speeds, speed, "speed")
-    else:  # of those that have something to show
+    if at is None:  # the one of those that have something to show
         distance = np.abs(np.asarray(speeds) - SHOWN_SPEED)
         at = int(np.argmin(np.where(strides["count"] > 0, distance, np.inf)))
     reader = _Reader(results)

@@ -17,6 +17,7 @@ import pytest
 
 from pronk_pin import Robot, cli
 from pronk_pin.compare import Experiment, Results, Schedule, random_scenarios, run_experiment
+from pronk_pin.compare.experiment.manifest import Manifest
 from pronk_pin.compare.experiment.suites import SUITES, load_suite
 from pronk_pin.compare.metrics.statistics import family
 from pronk_pin.compare.report.limitations import limitations
@@ -141,7 +142,8 @@ def test_limitations_are_those_of_this_run(result: Results, tmp_path: Path) -> N
     table = pd.read_csv(path)
     pd_upright = (table["metric"] == "upright") & (table["controller"] == "pd")
     table.loc[pd_upright & (table["scenario"] == "payload"), "value"] = 0.0
-    path.write_text(table.to_csv(index=False))
+    text = table.to_csv(index=False)
+    Manifest(copy.folder).write(path.name, text, made_of=copy.strides_digest)
     assert "In payload under pd 2 robots fell (0, 0.4 m/s)" in "\n".join(limitations(copy))
     free = replace(result.experiment, base="free", controllers=("pd", "ilc"))
     text = "\n".join(limitations(replace(result, experiment=free)))
