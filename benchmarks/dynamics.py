@@ -22,7 +22,7 @@ import pinocchio as pin
 from pronk_pin import Robot, dynamics, kinematics, load_robot
 from pronk_pin.dynamics import energetics
 from pronk_pin.gait import load_library
-from pronk_pin.inverse_dynamics import SAGITTAL_GUIDE, inverse_dynamics
+from pronk_pin.inverse_dynamics import PLANAR_CONSTRAINT, inverse_dynamics
 
 Call = Callable[[], object]
 WORLD = pin.LOCAL_WORLD_ALIGNED
@@ -252,15 +252,15 @@ def cones(samples: int) -> None:
     motion = load_library("a1").at(0.5).stance.motion(robot, np.linspace(0.0, 1.0, samples))
     state = (motion.q, motion.v, motion.a)
     print(f"\n{'friction cones, [us]':<28}{'all':>9}{'QP for':>9}{'feasible':>9}")
-    for friction, guide in ((0.6, None), (0.22, None), (0.22, SAGITTAL_GUIDE)):
+    for friction, constraint in ((0.6, None), (0.22, None), (0.22, PLANAR_CONSTRAINT)):
 
-        def solve(friction: float = friction, guide: Any = guide) -> Any:
-            return inverse_dynamics(robot, *state, friction=friction, guide=guide)
+        def solve(friction: float = friction, constraint: Any = constraint) -> Any:
+            return inverse_dynamics(robot, *state, friction=friction, constraint=constraint)
 
         (total,) = least((solve,), rounds=5, number=1)
-        free = inverse_dynamics(robot, *state, guide=guide).lam.reshape(samples, -1, 3)
+        free = inverse_dynamics(robot, *state, constraint=constraint).lam.reshape(samples, -1, 3)
         outside = np.linalg.norm(free[..., :2], axis=-1) > friction * free[..., 2]
-        name = f"mu {friction}, {'guided' if guide else 'free'} base"
+        name = f"mu {friction}, {'guided' if constraint else 'free'} base"
         share, feasible = outside.any(axis=1).mean(), solve().feasible.mean()
         print(f"{name:<28}{total / samples:>9.1f}{share:>9.0%}{feasible:>9.0%}")
 

@@ -45,7 +45,7 @@ def build(n: int, threads: int, *, chunked: bool) -> Simulation:
         [library.at(speed) for speed in np.linspace(-0.5, 0.8, n)],
         load_controller("ilc"),
         load_scenario("nominal"),
-        schedule=Schedule(startup=0.1, practice=SECONDS / 2, learning=SECONDS / 2),
+        schedule=Schedule(startup=0.1, baseline=SECONDS / 2, learning=SECONDS / 2),
         rng=np.random.default_rng(0),
         chunked=chunked,
         threads=threads,

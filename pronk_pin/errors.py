@@ -151,11 +151,11 @@ class GaitNotFound(PronkError):
     ) -> None:
         self.speed, self.status = speed, status
         self.violations = dict(violations)
-        self.fights = None if fights is None else dict(fights)
-        if self.fights:
-            gives = ", ".join(f"{name} by {value:.2g}" for name, value in self.fights.items())
+        self.conflicts = None if fights is None else dict(fights)
+        if self.conflicts:
+            gives = ", ".join(f"{name} by {value:.2g}" for name, value in self.conflicts.items())
             advice = f"these demands fight, and must give way: {gives}; {'; '.join(remedies)}"
-        elif self.fights is not None:
+        elif self.conflicts is not None:
             advice = (
                 "its demands do not fight, a gait exists on a coarse mesh: start from the solution "
                 f"of a neighbouring speed or apex ({_NEIGHBOUR})"

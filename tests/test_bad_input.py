@@ -34,7 +34,7 @@ from pronk_pin.compare import (
 )
 from pronk_pin.compare.simulation import memory
 from pronk_pin.compare.studies.gain_reduction import sweep_gains
-from pronk_pin.compare.studies.prediction import practise
+from pronk_pin.compare.studies.prediction import simulate_learning
 from pronk_pin.compare.studies.seeding import measure_seeding
 from pronk_pin.compare.studies.transfer import measure_transfers
 from pronk_pin.control import (
@@ -75,7 +75,7 @@ from pronk_pin.gait import (
 from pronk_pin.inverse_dynamics import feedforward, inverse_dynamics
 from pronk_pin.parity import compare_models
 from pronk_pin.robot import Robot, conventions
-from pronk_pin.viz import Film, Scene, Track, gait_scene, library_programme
+from pronk_pin.viz import Film, Scene, Track, gait_scene, library_menu
 
 any_value: Any = None  # what no type checker may look at
 Q, V, TAU, NAN = np.zeros(19), np.zeros(18), np.zeros(12), float("nan")
@@ -99,7 +99,7 @@ def simulated(**changes: Any) -> Simulation:
         "gaits": [gait()],
         "spec": load_controller("pd"),
         "scenario": load_scenario("nominal"),
-        "schedule": Schedule(practice=1.0, learning=0.5),
+        "schedule": Schedule(baseline=1.0, learning=0.5),
         "rng": np.random.default_rng(0),
     } | changes
     positional = [settings.pop(name) for name in ("robot", "gaits", "spec", "scenario")]
@@ -115,7 +115,7 @@ def taught(answer: Any) -> None:
 
     Simulation.run(
         simulated(
-            spec=ControllerSpec("mine", law=Odd()), schedule=Schedule(practice=0.0, learning=1.0)
+            spec=ControllerSpec("mine", law=Odd()), schedule=Schedule(baseline=0.0, learning=1.0)
         )
     )
 
@@ -218,8 +218,8 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "torque_limits is not an array of numbers",
     ),
     "guide as a text": (
-        lambda: inverse_dynamics(a1(), Q, V, V, guide="y"),
-        "guide='y' is a str; give a sequence in a tuple or a list",
+        lambda: inverse_dynamics(a1(), Q, V, V, constraint="y"),
+        "constraint='y' is a str; give a sequence in a tuple or a list",
     ),
     "feedforward without a gait": (
         lambda: feedforward(a1(), any_value),
@@ -413,7 +413,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "large seed": (lambda: scenario(seed=10**40), "seed=1000000000000"),
     "sensors of a scenario": (lambda: scenario(sensors=None), "sensors=None is nothing; give a Se"),
     "MJCF of a scenario": (lambda: scenario(mjcf=None), "mjcf=None is nothing; give a text"),
-    "sampled worlds": (
+    "sampled scenarios": (
         lambda: random_scenarios(2.0, 0),
         "n=2.0 is a float; give a whole number fr",
     ),
@@ -490,7 +490,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "is a Robot; give a name, one of: a1",
     ),
     "world of a number": (
-        lambda: experiment(world=3),
+        lambda: experiment(mjcf=3),
         "world=3 is no path; give a text or a pathl",
     ),
     "too many seeds": (lambda: experiment(seeds=range(10_001)), "10001 seeds; give 10000 or fewer"),
@@ -502,7 +502,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "run for months": (
         lambda: run_experiment(
-            experiment(seeds=range(10_000), schedule=Schedule(practice=86_400.0)), "x", workers=1
+            experiment(seeds=range(10_000), schedule=Schedule(baseline=86_400.0)), "x", workers=1
         ),
         "10000 simulations of one robot over 86420.5 s take about",
     ),
@@ -533,8 +533,10 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "no speeds or no shares; give at least one of each",
     ),
     "seeding": (lambda: measure_seeding((0.0, 0.2, 0.1), scenario()), "speeds must increase; give"),
-    "practice": (
-        lambda: practise(load_controller("ilc"), (0.0,), scenario(), robot="a1", strides=0),
+    "baseline": (
+        lambda: simulate_learning(
+            load_controller("ilc"), (0.0,), scenario(), robot="a1", strides=0
+        ),
         "strides=0; give a whole number from 1 to 100000",
     ),
     # Looking
@@ -545,7 +547,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "track by a number": (lambda: Track(3, np.zeros(1), Q[None]), "name of a track=3 is an int; "),
     "scene of nothing": (lambda: Scene(a1(), (None,)), "tracks[0]=None is nothing; give a Track"),
     "strides of a scene": (lambda: gait_scene(a1(), gait(), strides=0), "strides=0; give a whole"),
-    "programme": (lambda: library_programme("a1"), "library='a1' is a str; give a GaitLibrary"),
+    "menu": (lambda: library_menu("a1"), "library='a1' is a str; give a GaitLibrary"),
 }
 
 
@@ -615,7 +617,7 @@ def test_lists_arrays_and_numbers_of_numpy_are_as_good_as_pythons(
 
 def test_a_folder_may_be_a_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    short = experiment(schedule=Schedule(startup=0.1, practice=1.0, learning=0.0))
+    short = experiment(schedule=Schedule(startup=0.1, baseline=1.0, learning=0.0))
     results = run_experiment(short, "a string", workers=1, progress=False)
     assert results.folder == Path("a string")
     assert (tmp_path / "a string" / "summary.csv").is_file()
@@ -625,7 +627,7 @@ def test_what_does_not_fit_into_memory_is_refused_with_the_estimate_and_the_reme
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     gaits = list(load_library("a1").gaits[:14])
-    schedule = Schedule(practice=100.0, learning=100.0)
+    schedule = Schedule(baseline=100.0, learning=100.0)
     simulation = simulated(gaits=gaits, schedule=replace(schedule))
     log, estimate = simulation.strides, memory.log_size(gaits, schedule.duration)
     arrays = [*log.scalars.values(), *log.curves.values(), log.base, log.attitude]
@@ -646,13 +648,13 @@ SHORT = ["compare", "--speeds", "0.3", "--controllers", "pd"]
 
 COMMANDS: list[tuple[list[str], str]] = [
     (["compare", "--schedule.learning", "1e9"], "learning=1000000000.0; give a number from 0 to"),
-    (["compare", "--schedule.practice", "nan"], "schedule: practice=nan; give a number from 0 to"),
+    (["compare", "--schedule.baseline", "nan"], "schedule: learning=nan; give a number from 0 to"),
     (["compare", "--schedule.startup", "inf"], "schedule: startup=inf; give a number from 0 to"),
     (["compare", "--schedule.scatter", "5"], "scatter=5.0; give a number from 0 to 0.5 rad"),
-    (["compare", "--schedule.practice", "many"], "Error parsing --schedule.practice"),
+    (["compare", "--schedule.baseline", "many"], "Error parsing --schedule.baseline"),
     (
-        ["compare", "--schedule.practice", "86400"],
-        "GB; shorten --schedule.practice and --schedule.",
+        ["compare", "--schedule.baseline", "86400"],
+        "GB; shorten --schedule.baseline and --schedule.",
     ),
     (["compare", "--scenarios", "delay=1e9"], "delay=1000000000.0; give a number from 0 to 0.2 s"),
     (["compare", "--scenarios", "payload=1e308"], "payload=1e+308; give a number from 0 to 100 kg"),
@@ -680,7 +682,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     ([*SHORT, "--workers", "two"], "Error parsing --workers: "),
     ([*SHORT, "--executor", "here", "--folder", "x"], "executor 'here' is not an address; give d"),
     (
-        [*SHORT, "--world", "nowhere.xml", "--folder", "x"],
+        [*SHORT, "--mjcf", "nowhere.xml", "--folder", "x"],
         "nowhere.xml: missing; give the path",
     ),
     (["reproduce", "--seeds", "-1"], "seeds[0]=-1; give a whole number from 0 on"),
@@ -735,7 +737,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["ilc", "gains", "--speed", "7"], "speed 7 m/s is outside the gait library"),
     (["ilc", "transfer", "pd"], "controller 'pd' does not learn; transfers need a controller"),
     (["ilc", "transfer", "--speed", "0", "0.1"], "transfers need three speeds or more: one betwe"),
-    (["ilc", "transfer", "--worlds", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
+    (["ilc", "transfer", "--scenarios", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
     (["ilc", "transfer", "--speed", "0", "7", "8"], "speed 7 m/s is outside the gait library"),
     (["ilc", "seeding", "--speed", "0"], "seeding needs three speeds or more"),
     (["ilc", "seeding", "--speed", "0", "0", "0"], "the speeds must increase; give each once, th"),

@@ -561,10 +561,10 @@ def test_a_command_that_reads_a_damaged_file_says_so_in_one_line(
 RESULT = Experiment(
     speeds=(0.0,),
     controllers=("pd", "ilc", "ilc-stance"),
-    schedule=Schedule(startup=0.1, practice=1.0, learning=1.0),
+    schedule=Schedule(startup=0.1, baseline=1.0, learning=1.0),
 )
 OPTIONS = (
-    "--speeds 0 --controllers pd ilc ilc-stance --schedule.startup 0.1 --schedule.practice 1 "
+    "--speeds 0 --controllers pd ilc ilc-stance --schedule.startup 0.1 --schedule.baseline 1 "
     "--schedule.learning 1 --workers 1"
 )
 RESULTS_COMMANDS = (
@@ -587,7 +587,7 @@ def result(
     """A small results folder, in an MJCF so that it holds a parity.json too."""
     folder = tmp_path_factory.mktemp("results")
     (folder / "robot.xml").write_bytes(samples["fuzz.xml"])
-    experiment = dataclasses.replace(RESULT, world=str(folder / "robot.xml"))
+    experiment = dataclasses.replace(RESULT, mjcf=str(folder / "robot.xml"))
     return run_experiment(experiment, folder / "whole", workers=1, progress=False).folder
 
 
@@ -666,7 +666,7 @@ def test_a_command_that_reads_a_damaged_result_says_so_in_one_line(
 ) -> None:
     folder, found = tmp_path / "results", []
     shutil.copytree(result, folder)
-    world = ["--world", str(result.parent / "robot.xml")] if command.startswith("compare") else []
+    world = ["--mjcf", str(result.parent / "robot.xml")] if command.startswith("compare") else []
     places = {"results": folder, "whole": result, "out": tmp_path / "out"}
     words = [word.format(**places) for word in command.split()] + world
     Said(words, capfd)  # the first time, files are made

@@ -37,7 +37,11 @@ class _Runs(Protocol):
     def run(self) -> int | None: ...
 
 
-RENAMED: dict[str, str] = {}
+RENAMED: dict[str, str] = {
+    "--schedule.practice": "--schedule.baseline",
+    "--world": "--mjcf",
+    "--worlds": "--scenarios",
+}
 """Options that the last release knew by another name, with their names of today."""
 
 

@@ -30,7 +30,7 @@ from ..robot.formats import write_mjcf, write_urdf
 from ..viz import known_format, write_replay
 from ..viz.figures import write_explanation_figure
 from ..viz.report import write_figures, write_report
-from ..viz.scenes import nearest, practice_programme
+from ..viz.scenes import nearest, result_menu
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Compare:
         else:
             known_address(self.executor)
         name = "comparison" if self.suite == "default" else self.suite
-        folder, world = self.folder or default_folder(name), self.experiment.world
+        folder, world = self.folder or default_folder(name), self.experiment.mjcf
         if world:
             print(mjcf_parity(load_robot(self.experiment.robot), world).table())
         results = run_experiment(
@@ -134,7 +134,7 @@ class Explain:
     """Take the learned torque of a result apart: rotors, friction, load, motors, and the rest.
 
     Prints what the model lacks, with intervals, how much of the learned torque each cause explains,
-    and what cannot be told apart. The mended model can be written to a file, and tried out.
+    and what cannot be told apart. The identified model can be written to a file, and tried out.
     """
 
     result: Positional[Path]
@@ -148,12 +148,12 @@ class Explain:
     speed: float | None = None
     """Speed that the figure shows [m/s]; by default the one nearest to 0.5."""
     write_urdf: Path | None = None
-    """Write the mended model to this URDF."""
+    """Write the identified model to this URDF."""
     write_mjcf: Path | None = None
-    """Write the mended model to this MJCF."""
+    """Write the identified model to this MJCF."""
     close_loop: bool = False
-    """Try the mended model, with its gaits optimised again, beside the model, the torque library
-    and practice, at speeds halfway between those of the result and with 3 kg more."""
+    """Try the identified model, with its gaits optimised again, beside the model, the torque
+    library and learning, at speeds halfway between those of the result and with 3 kg more."""
     imu_noise: float = 0.0
     """Standard deviation of noise added to the trunk's acceleration [m/s^2]."""
     draws: int = 300
@@ -170,17 +170,23 @@ class Explain:
         cell = results.find(controller=self.controller, scenario=self.scenario)
         strides = results.all_strides(controller=self.controller, scenario=self.scenario)
         rng = np.random.default_rng(self.seed)
-        found = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
-        print(f"{cell.controller} in scenario {cell.scenario}\n\n{describe(found)}")
+        explanation = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
+        print(f"{cell.controller} in scenario {cell.scenario}\n\n{describe(explanation)}")
         if self.figure is not None:
-            print(f"\nfigure  {write_explanation_figure(found, self.figure, speed=self.speed)}")
-        notes = [f"{found.robot.name}, mended by what practice found", "", describe(found)]
+            print(
+                f"\nfigure  {write_explanation_figure(explanation, self.figure, speed=self.speed)}"
+            )
+        notes = [
+            f"{explanation.robot.name}, identified by what learning found",
+            "",
+            describe(explanation),
+        ]
         if self.write_urdf is not None:
-            print(f"\nurdf    {write_urdf(found.mended, self.write_urdf, notes)}")
+            print(f"\nurdf    {write_urdf(explanation.identified, self.write_urdf, notes)}")
         if self.write_mjcf is not None:
-            print(f"\nmjcf    {write_mjcf(found.mended, self.write_mjcf, notes)}")
+            print(f"\nmjcf    {write_mjcf(explanation.identified, self.write_mjcf, notes)}")
         if self.close_loop:
-            print(f"\n{format_loop(close_loop(found, strides, rng=rng))}")
+            print(f"\n{format_loop(close_loop(explanation, strides, rng=rng))}")
 
     def _check(self) -> None:
         """What can be told to be wrong before anything is read."""
@@ -194,12 +200,12 @@ class Explain:
 
 
 def _print_tables(results: Results) -> None:
-    """Table I, overview and verdict of one world; the overviews of many and one verdict."""
-    summary, worlds = results.summary(), families(results.experiment.scenarios)
-    if len(worlds) > 1:
+    """Table I, overview and verdict of one scenario; the overviews of many and one verdict."""
+    summary, scenarios = results.summary(), families(results.experiment.scenarios)
+    if len(scenarios) > 1:
         print(format_suite(summary))
     else:
-        print(format_tables(summary, scenario=worlds[0]))
+        print(format_tables(summary, scenario=scenarios[0]))
 
 
 def _write_pages(results: Results) -> None:
@@ -207,7 +213,7 @@ def _write_pages(results: Results) -> None:
     print(f"\nresults  {results.folder}")
     print(f"report   {write_report(results)}")
     try:
-        replay = str(write_replay(practice_programme(results), results.folder / "replay.html"))
+        replay = str(write_replay(result_menu(results), results.folder / "replay.html"))
     except InvalidInput as error:  # no stride was finished
         replay = f"none: {error}"
     print(f"replay   {replay}")

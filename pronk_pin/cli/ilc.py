@@ -19,8 +19,8 @@ from ..compare.studies import (
     describe_transfers,
     measure_seeding,
     measure_transfers,
-    practise,
-    stored_practice,
+    simulate_learning,
+    stored_learning,
     sweep_gains,
 )
 from ..control import load_controller
@@ -41,10 +41,10 @@ class Analyze:
     speed: tuple[float, ...] = (0.0,)
     """Speeds [m/s]."""
     scenario: str = "nominal"
-    """World of the practice."""
+    """Scenario of the learning."""
     result: Path | None = None
-    """Results folder with a practice of a law of the stance only, as ilc-stance; by default a short
-    one is simulated."""
+    """Results folder with a learning run of a law of the stance only, as ilc-stance; by default a
+    short one is simulated."""
     strides: int = 20
     """Strides of learning to compare."""
     robot: str = "a1"
@@ -58,12 +58,16 @@ class Analyze:
         known_format(self.figure.suffix.removeprefix("."))
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         if self.result is None:
-            made = practise(spec, self.speed, scenario, robot=self.robot, strides=self.strides)
+            strides = simulate_learning(
+                spec, self.speed, scenario, robot=self.robot, strides=self.strides
+            )
         else:
-            made = stored_practice(Results.load(self.result), spec, self.speed, scenario)
+            strides = stored_learning(Results.load(self.result), spec, self.speed, scenario)
         predictions = []
         for speed in self.speed:
-            predictions.append(compare_prediction(spec, made, speed, scenario, number=self.strides))
+            predictions.append(
+                compare_prediction(spec, strides, speed, scenario, number=self.strides)
+            )
             print(describe_prediction(predictions[-1]), end="\n\n")
         print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
 
@@ -72,15 +76,15 @@ class Analyze:
 class Gains:
     """Tell whether learning permits smaller feedback gains, as the paper claims.
 
-    Practises once, then replays what was learned with smaller gains, beside the same gains alone.
+    Learns once, then replays what was learned with smaller gains, beside the same gains alone.
     """
 
     controller: Positional[str] = "ilc"
-    """Controller that practises."""
+    """Controller that learns."""
     speed: tuple[float, ...] = (-0.4, 0.0, 0.4, 0.8)
     """Speeds [m/s]."""
     scenario: str = "nominal"
-    """World of the practice."""
+    """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
     figure: Path = Path("gains.png")
@@ -97,20 +101,20 @@ class Gains:
 
 @dataclass(frozen=True)
 class Transfer:
-    """Tell where a stored skill may be reused, and where it has to be practised again.
+    """Tell where stored feedforward may be reused, and where it has to be learned again.
 
     Learns at home, replays the torque library at home, at speeds that were left out, and in other
-    worlds, and compares with practice there.
+    worlds, and compares with learning there.
     """
 
     controller: Positional[str] = "ilc"
-    """Controller that practises."""
+    """Controller that learns."""
     speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
     """Speeds [m/s], increasing."""
     scenario: str = "nominal"
-    """World of the practice."""
-    worlds: tuple[str, ...] = ("payload", "weak-motors", "soft-ground", "slope", "gravity")
-    """Worlds in which the skill is tried."""
+    """Scenario of the learning."""
+    scenarios: tuple[str, ...] = ("payload", "weak-motors", "soft-ground", "slope", "gravity")
+    """Scenarios in which the stored feedforward is tried."""
     robot: str = "a1"
     """Robot."""
     figure: Path = Path("transfer.png")
@@ -123,7 +127,7 @@ class Transfer:
             load_controller(self.controller),
             self.speed,
             load_scenario(self.scenario),
-            [load_scenario(name) for name in self.worlds],
+            [load_scenario(name) for name in self.scenarios],
             robot=self.robot,
         )
         print(describe_transfers(table))
@@ -134,13 +138,13 @@ class Transfer:
 class Seeding:
     """Tell what a seed saves: learning from nothing, from the model, and from neighbouring speeds.
 
-    The torque library practises at all speeds; each inner one begins with its neighbours' torques.
+    The torque library learns at all speeds; each inner one begins with its neighbours' torques.
     """
 
     speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
     """Speeds [m/s], increasing."""
     scenario: str = "nominal"
-    """World of the practice."""
+    """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
     figure: Path = Path("seeding.png")

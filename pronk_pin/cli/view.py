@@ -11,9 +11,9 @@ from tyro.conf import Positional, arg
 from .._checks import NOT_NEGATIVE, none_or, real, whole
 from ..compare import Results
 from ..errors import FileProblem, InvalidInput
-from ..viz import Film, Programme, library_programme, serve, write_film, write_png, write_replay
+from ..viz import Film, Menu, library_menu, serve, write_film, write_png, write_replay
 from ..viz.player import DURATION, known_port
-from ..viz.scenes import practice_programme
+from ..viz.scenes import result_menu
 from .gaits import open_library
 
 
@@ -71,17 +71,17 @@ class View:
         for name in ("speed", "apex"):
             none_or(real, name, getattr(self, name))
         none_or(whole, "stride", self.stride, NOT_NEGATIVE)
-        programme = self._programme()
+        menu = self._menu()
         if self.html is not None:
-            print(f"replay  {write_replay(programme, self.html)}")
+            print(f"replay  {write_replay(menu, self.html)}")
         if self.png is not None:
-            print(f"picture {write_png(programme.scene(), self.png, self.film)}")
+            print(f"picture {write_png(menu.scene(), self.png, self.film)}")
         for path in (self.gif, self.mp4):
             if path is not None:
-                print(f"film    {write_film(programme.scene(), path, self.film)}")
+                print(f"film    {write_film(menu.scene(), path, self.film)}")
         if all(path is None for path in (self.html, self.png, self.gif, self.mp4)):
             serve(
-                programme,
+                menu,
                 port=self.port,
                 host=self.host,
                 open_browser=self.open,
@@ -94,10 +94,10 @@ class View:
             if getattr(self, name) is not None:
                 raise InvalidInput(f"--{name} is for {other}; name one, or leave the option out")
 
-    def _programme(self) -> Programme:
+    def _menu(self) -> Menu:
         if self.what is not None and self.what.is_dir():
             self._refuse(("apex",), "a gait library")
-            return practice_programme(
+            return result_menu(
                 Results.load(self.what),
                 speed=self.speed,
                 controller=self.controller,
@@ -113,7 +113,7 @@ class View:
                 "build --output'",
             )
         self._refuse(("controller", "scenario", "beside", "stride"), "a results folder")
-        return library_programme(
+        return library_menu(
             open_library(self.what, self.robot, self.gait, self.base),
             speed=self.speed,
             apex=self.apex,

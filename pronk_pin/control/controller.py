@@ -18,8 +18,8 @@ from ..kinematics import rotate_leg
 from ..robot import BASES, NL, Robot, as_array, as_numbers
 from .controller_spec import ControllerSpec
 from .feedback import Balance, SpeedEstimator
-from .learning import SKIPPED, ModelBasedILC, anti_windup, given, learned_by, symmetric
-from .prediction import Settings, lifted_model
+from .learning import SKIPPED, ModelBasedILC, anti_windup, delivered, learned_by, symmetric
+from .prediction import StrideSettings, lifted_model
 from .signals import (
     PARTS,
     SAMPLES,
@@ -94,7 +94,9 @@ class Controller:
         self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
         self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
         self._tilt = np.zeros((n, len(PARTS)))
-        self._stood = np.zeros(n, dtype=np.intp)  # why a stance was none, index into `SKIPPED`
+        self._stance_verdict = np.zeros(
+            n, dtype=np.intp
+        )  # why a stance was none, index into `SKIPPED`
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
@@ -110,10 +112,10 @@ class Controller:
                 "use another controller, or base 'locked'"
             )
         if isinstance(spec.law, ModelBasedILC):
-            settings = Settings(
+            settings = StrideSettings(
                 spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
             )
-            self._laws[0] = spec.law.along([lifted_model(robot, gait, settings) for gait in gaits])
+            self._laws[0] = spec.law.bind([lifted_model(robot, gait, settings) for gait in gaits])
         self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
         self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
         self.balance = None
@@ -126,7 +128,7 @@ class Controller:
                 ticks=self.max_ticks,
                 timestep=timestep,
             )
-        self._flown = self._flight.planned.copy()  # how long the last flights lasted
+        self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
         if flight is not None:
             self._flight.stretch(np.arange(n), flight)
         self._always_retimes = flight is None and not any(self._laws)
@@ -177,7 +179,7 @@ class Controller:
         """Write the flight tapes of robots that have just finished a stance, and its record."""
         record = self.record(0, rows, log)
         self._last[0].put(rows, self._learnable(record, rows, log))
-        self._stood[rows] = self._judge_contact(log)
+        self._stance_verdict[rows] = self._judge_contact(log)
         self._note_tilt(0, rows, log)
         speed = self._estimator.update(rows, log)
         if self.balance is not None:
@@ -211,14 +213,14 @@ class Controller:
         record = self.record(1, rows, log)
         self._last[1].put(rows, record)
         # Contact is made between two ticks.
-        self._flown[rows] = (log.length + 0.5) * self._timestep
+        self._flight_measured[rows] = (log.length + 0.5) * self._timestep
         relative = duration / (self._stance.planned[rows] + self._flight.planned[rows])
         reasons = []
         for last in self._last:
             last.relative_duration[rows] = relative
             last.upright[rows] = True if upright is None else upright
             reasons.append(self.spec.selection.skipped(last)[rows])
-        reasons.append(self._stood[rows])
+        reasons.append(self._stance_verdict[rows])
         self._note_tilt(1, rows, log)
         tilted = self._tilt[rows].max(axis=1) > self.spec.selection.tilt
         reasons.append(np.where(tilted, SKIPPED.index("tilted"), 0))
@@ -255,7 +257,7 @@ class Controller:
         ticks = slice(min(reference.position.shape[1], log.joints.shape[1]))
         error = reference.position[rows, ticks] - log.joints[:, ticks]
         rate = reference.velocity[rows, ticks] - log.joint_rates[:, ticks]
-        error, rate, early = resample(error, index), resample(rate, index), error[:, : log.felt]
+        error, rate, early = resample(error, index), resample(rate, index), error[:, : log.sensed]
         return StrideRecord(
             error=error,
             error_rate=rate,
@@ -286,12 +288,14 @@ class Controller:
         for part, law in enumerate(self._laws):
             if law is not None and rows.size:
                 record = self._last[part].take(rows)
-                learned = learned_by(law, self._told(part, rows, record), self.spec.name)
+                learned = learned_by(
+                    law, self._learnable_record(part, rows, record), self.spec.name
+                )
                 self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
 
-    def _told(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
+    def _learnable_record(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
         """Prepare the record that a law learns from: delivered torques, look-ahead, symmetry."""
-        learnable = given(record)
+        learnable = delivered(record)
         if part == 1:
             # What the end of a flight does shows in the stance that follows it, which is yet to
             # come; it will be like the last one.
@@ -307,6 +311,6 @@ class Controller:
         if self.spec.timing is not None and rows.size:
             flight = self._flight
             following = self.spec.timing.next(
-                flight.duration[rows], self._flown[rows], flight.planned[rows]
+                flight.duration[rows], self._flight_measured[rows], flight.planned[rows]
             )
             flight.stretch(rows, following)

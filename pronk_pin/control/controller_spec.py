@@ -38,7 +38,7 @@ class ControllerSpec:
         name: Short name, as on the command line.
         source: Source of its initial feedforward: "none", "model", "library", or "identified", the
             model with the parameters identified from learned torques.
-        mended_gaits: Play gaits that were optimised again with the identified model.
+        identified_gaits: Play gaits that were optimised again with the identified model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
         timing: Adaptation of the flight's duration to the measured one; None plays it as planned.
@@ -58,7 +58,7 @@ class ControllerSpec:
 
     name: str
     source: str = "none"
-    mended_gaits: bool = False
+    identified_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
     timing: FlightTiming | None = None
@@ -76,7 +76,7 @@ class ControllerSpec:
         file_name("name of a controller", self.name)
         prefix = f"controller '{self.name}': "
         known_name("source of feedforward", self.source, SOURCES)
-        for name in ("mended_gaits", "imu"):
+        for name in ("identified_gaits", "imu"):
             flag(prefix + name, getattr(self, name))
         for name in ("law", "flight_law"):
             known_law(prefix + name, getattr(self, name))
@@ -112,26 +112,26 @@ FLIGHT_LAW = PDTypeILC(
 )
 """Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
 
-_PRACTICE = ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming())
+_ILC = ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming())
 """Learning from nothing, over the whole stride."""
 
 CONTROLLERS = {
     spec.name: spec
     for spec in (
         ControllerSpec("pd"),
-        _PRACTICE,
+        _ILC,
         ControllerSpec("model", source="model"),
         ControllerSpec("library", source="library", timing=FlightTiming()),
-        replace(_PRACTICE, name="model+ilc", source="model"),
-        replace(_PRACTICE, name="library+ilc", source="library"),
+        replace(_ILC, name="model+ilc", source="model"),
+        replace(_ILC, name="library+ilc", source="library"),
         ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
         ControllerSpec("identified", source="identified"),
-        ControllerSpec("identified+gait", source="identified", mended_gaits=True),
+        ControllerSpec("identified+gait", source="identified", identified_gaits=True),
         ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
-        replace(_PRACTICE, name="ilc-imu", imu=True),
+        replace(_ILC, name="ilc-imu", imu=True),
         ControllerSpec("model+timing", source="model", timing=FlightTiming()),
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )

@@ -9,12 +9,12 @@ import numpy as np
 from .._checks import known_name
 from .._typing import Array
 from ..gait import Gait, known_gaits
-from ..inverse_dynamics import SAGITTAL_GUIDE, feedforward
+from ..inverse_dynamics import PLANAR_CONSTRAINT, feedforward
 from ..robot import BASES, Robot
 from .signals import SAMPLES
 
-GUIDES: dict[str, tuple[str, ...] | None] = {
-    "locked": SAGITTAL_GUIDE,
+CONSTRAINTS: dict[str, tuple[str, ...] | None] = {
+    "locked": PLANAR_CONSTRAINT,
     "sagittal": ("y", "roll", "yaw"),
     "free": None,
 }
@@ -38,7 +38,7 @@ def model_feedforward(
         UnknownName: There is no such base; see `BASES`.
     """
     gaits = known_gaits(robot, gaits)
-    guide = GUIDES[known_name("base", base, BASES)]
+    constraint = CONSTRAINTS[known_name("base", base, BASES)]
     solutions = [
         feedforward(
             robot,
@@ -46,7 +46,7 @@ def model_feedforward(
             samples=samples,
             friction=friction,
             contact="rolling",
-            guide=guide,
+            constraint=constraint,
         )
         for gait in gaits
     ]

@@ -1,8 +1,10 @@
-"""Dynamics of a robot whose trunk a guide holds to the sagittal plane, and their derivatives.
+"""Dynamics of a robot whose trunk a planar constraint holds to the sagittal plane, and their
+derivatives.
 
-The guide takes the trunk's y, roll and yaw, and, where the base is locked, its pitch. Left free are
-x, z, perhaps pitch, and the joints: 14 or 15 coordinates y with the rates y'. On their rows eq. (5)
-holds as it stands, and eq. (2) in flight; the guide's forces are in the others.
+The planar constraint takes the trunk's y, roll and yaw, and, where the base is locked, its pitch.
+Left free are x, z, perhaps pitch, and the joints: 14 or 15 coordinates y with the rates y'. On
+their rows eq. (5) holds as it stands, and eq. (2) in flight; the planar constraint's forces are in
+the others.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from .derivatives import partials
 
 
 def planar_rows(robot: Robot, base: Base = "locked") -> IntArray:
-    """Indices of the velocities that the guide leaves free: x, z, perhaps pitch, and the joints.
+    """Indices of the velocities that the planar constraint leaves free: x, z, perhaps pitch, and
+    the joints.
 
     x and z are those of the trunk, which stay in the sagittal plane.
     """
@@ -38,7 +41,8 @@ def planar_equations(
     feet: Sequence[str] = (),
     base: Base = "locked",
 ) -> tuple[Array, Array]:
-    """Matrix and right-hand side of eq. (5) on the rows that the guide leaves free, (2) in flight.
+    """Matrix and right-hand side of eq. (5) on the rows that the planar constraint leaves free, (2)
+    in flight.
 
     Arguments are those of `planar_dynamics`. The unknowns are the accelerations of the free rows,
     and the contact forces of the feet.
@@ -65,7 +69,7 @@ def planar_dynamics(
     feet: Sequence[str] = (),
     base: Base = "locked",
 ) -> Array:
-    """Acceleration of the guided robot: eq. (5) of the feet that stand, or (2) without any.
+    """Acceleration of the planar robot: eq. (5) of the feet that stand, or (2) without any.
 
     Args:
         robot: The robot.
@@ -74,10 +78,10 @@ def planar_dynamics(
         tau: Motor torques [N m], shape (12,).
         contact: How feet stand on the ground.
         feet: The legs whose feet stand.
-        base: What the guide leaves the trunk.
+        base: What the planar constraint leaves the trunk.
 
     Returns:
-        Acceleration, shape (18,), zero where the guide holds the trunk.
+        Acceleration, shape (18,), zero where the planar constraint holds the trunk.
     """
     rows, a = planar_rows(robot, base), np.zeros(robot.nv)
     kkt, right = planar_equations(robot, q, v, tau, contact=contact, feet=feet, base=base)

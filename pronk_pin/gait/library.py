@@ -59,11 +59,15 @@ class GaitLibrary:
         if not isinstance(apex, float):  # NaN asks for the lowest
             object.__setattr__(self, "apex", real("apex", apex))
         grid = [(apex, speed) for apex in self.apexes for speed in self.speeds]
-        have = [(gait.apex, gait.speed) for gait in self.gaits]
-        if not have or len(have) != len(grid) or not np.allclose(have, grid, rtol=0, atol=_SAME):
+        given_grid = [(gait.apex, gait.speed) for gait in self.gaits]
+        if (
+            not given_grid
+            or len(given_grid) != len(grid)
+            or not np.allclose(given_grid, grid, rtol=0, atol=_SAME)
+        ):
             raise InvalidInput(
                 "a gait library needs one gait for each speed at each apex, ordered by apex and "
-                f"then by increasing speed, not (apex, speed) = {have}"
+                f"then by increasing speed, not (apex, speed) = {given_grid}"
             )
         if len(self.audit) not in (0, len(self.gaits)):
             raise InvalidInput(

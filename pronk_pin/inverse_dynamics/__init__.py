@@ -1,13 +1,13 @@
 """Motor torques and contact forces for a given motion: eq. (2) solved for tau and lambda.
 
-Comes in: a `Robot`, a motion or a wanted wrench, which feet stand, friction, a guide.
+Comes in: a `Robot`, a motion or a wanted wrench, which feet stand, friction, a planar constraint.
 Goes out: motor torques, contact forces, and whether they are feasible.
 """
 
 from .distribution import distribute_wrench, wrench_matrix
 from .solve import (
-    GUIDE_COORDINATES,
-    SAGITTAL_GUIDE,
+    CONSTRAINT_COORDINATES,
+    PLANAR_CONSTRAINT,
     Feedforward,
     InverseDynamics,
     feedforward,
@@ -15,8 +15,8 @@ from .solve import (
 )
 
 __all__ = [
-    "GUIDE_COORDINATES",
-    "SAGITTAL_GUIDE",
+    "CONSTRAINT_COORDINATES",
+    "PLANAR_CONSTRAINT",
     "Feedforward",
     "InverseDynamics",
     "distribute_wrench",

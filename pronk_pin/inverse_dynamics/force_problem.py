@@ -1,7 +1,7 @@
 """Contact forces of a motion: the equations, and their cheapest solution in closed form.
 
-The unknowns y stack the contact forces lam, foot by foot, and the guide's forces w. They must meet
-the base's equations, and the motors give the joints' remaining torques:
+The unknowns y stack the contact forces lam, foot by foot, and the planar constraint's forces w.
+They must meet the base's equations, and the motors give the joints' remaining torques:
 
     minimise    |b_joints - lever lam|^2 + weight |lam|^2
     subject to  wrench y = b_base
@@ -38,7 +38,7 @@ class ForceProblem(NamedTuple):
     b_joints: Array
     """Torques needed without contact, against friction too [N m], shape (..., 12)."""
     wrench: Array
-    """Wrench of unit forces on the trunk, in its axes, shape (..., 6, 3 feet + guides)."""
+    """Wrench of unit forces on the trunk, in its axes, shape (..., 6, 3 feet + constraints)."""
     b_base: Array
     """Wrench the trunk needs [N, N m], shape (..., 6)."""
 
@@ -101,7 +101,7 @@ def force_problem(
         motion: q, v and a, with at most one leading dimension.
         legs: Legs in contact, by index.
         radius: Distance from the foot's centre to the contact point [m].
-        axes: Base coordinates that the guide holds, by index.
+        axes: Base coordinates that the planar constraint holds, by index.
     """
     q, v, a = motion
     if q.ndim == 1:
@@ -119,10 +119,10 @@ def force_problem(
     wrench = transposed[..., :NB, :]
     if axes:
         # World forces at the trunk's origin, in the trunk's axes as the base's equations are.
-        guide = np.zeros((*q.shape[:-1], NB, NB))
+        constraint = np.zeros((*q.shape[:-1], NB, NB))
         into_trunk = np.swapaxes(rotation_matrix(q[..., 3:7]), -1, -2)
-        guide[..., :3, :3] = guide[..., 3:, 3:] = into_trunk
-        wrench = np.concatenate([wrench, guide[..., list(axes)]], axis=-1)
+        constraint[..., :3, :3] = constraint[..., 3:, 3:] = into_trunk
+        wrench = np.concatenate([wrench, constraint[..., list(axes)]], axis=-1)
     return ForceProblem(transposed[..., NB:, :], needed[..., NB:], wrench, needed[..., :NB])
 
 
@@ -130,7 +130,7 @@ def saddle_point(problem: ForceProblem) -> SaddlePoint:
     """The optimality conditions of a problem, inverted.
 
     K = [[H, wrench^T], [wrench, -damping]], with H = lever^T lever + weight on the contact forces
-    and zero on the guide's.
+    and zero on the planar constraint's.
     """
     contacts, size = problem.contacts, problem.size
     holding = np.swapaxes(problem.lever, -1, -2)  # (..., 3 feet, 12)

@@ -65,7 +65,7 @@ def constrained_forces(
         tau_max: Torque limits [N m], shape (12,); infinite where there are none.
 
     Returns:
-        Shape (m, 3 feet + guides).
+        Shape (m, 3 feet + constraints).
     """
     chosen = ForceProblem(*(part[rows] for part in problem))
     chain = _Chain(chosen, conditions.matrix[rows], conditions.rhs[rows], friction, tau_max)

@@ -2,7 +2,8 @@
 
 Four feet on the ground leave the forces undetermined: the feet can push against each other without
 moving the robot. What decides these internal forces is the cost, |tau|^2 as in eq. (6): of all
-forces that give the motion, those with the smallest motor torques. The guide's forces cost nothing.
+forces that give the motion, those with the smallest motor torques. The planar constraint's forces
+cost nothing.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ from ..robot import Robot, as_array, as_numbers, as_robot, as_state, leg_indices
 from .force_problem import ForceProblem, SaddlePoint, force_problem, saddle_point
 from .qp import cone_sides, constrained_forces
 
-GUIDE_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
-"""Base coordinates that a guide can hold."""
+CONSTRAINT_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+"""Base coordinates that a planar constraint can hold."""
 
-SAGITTAL_GUIDE = ("y", "roll", "pitch", "yaw")
-"""The guide of section III of the paper: the sagittal plane without rotation."""
+PLANAR_CONSTRAINT = ("y", "roll", "pitch", "yaw")
+"""The planar constraint of section III of the paper: the sagittal plane without rotation."""
 
 _TOLERANCE = 1e-6
 """Violation up to which a solution counts as feasible [N, N m]."""
@@ -88,9 +89,9 @@ class InverseDynamics(NamedTuple):
     """Motor torques [N m], shape (..., 12)."""
     lam: Array
     """Contact forces in the world's axes, foot by foot [N], shape (..., 3 feet)."""
-    guide: Array
-    """Forces [N] and moments [N m] of the guide in the world's axes, at the trunk's origin, in the
-    order of the coordinates it holds, shape (..., guides)."""
+    constraint: Array
+    """Forces [N] and moments [N m] of the planar constraint in the world's axes, at the trunk's
+    origin, in the order of the coordinates it holds, shape (..., constraints)."""
     residual: Array
     """Largest violation of the equations of motion, eq. (2) [N, N m], shape (...)."""
     feasible: BoolArray
@@ -107,15 +108,16 @@ class Feedforward:
         stance: Motor torques in stance [N m], shape (samples, 12).
         flight: Motor torques in flight [N m], shape (samples, 12).
         lam: Contact forces in stance in the world's axes [N], shape (samples, 4, 3).
-        guide: Forces of the guide in stance, see `InverseDynamics`, shape (samples, guides).
-        feasible: Whether stance keeps to the equations, cones and limits, shape (samples,).
+        constraint: Forces of the planar constraint in stance, see `InverseDynamics`, shape
+        (samples, constraints). feasible: Whether stance keeps to the equations, cones and limits,
+        shape (samples,).
     """
 
     s: Array
     stance: Array
     flight: Array
     lam: Array
-    guide: Array
+    constraint: Array
     feasible: BoolArray
 
 
@@ -129,7 +131,7 @@ def inverse_dynamics(
     contact: Contact = "point",
     friction: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
-    guide: Sequence[str] | None = None,
+    constraint: Sequence[str] | None = None,
 ) -> InverseDynamics:
     """Motor torques and contact forces for a motion: eq. (2) solved for tau and lambda; batched.
 
@@ -142,8 +144,8 @@ def inverse_dynamics(
     checked.
 
     A motion and robot that are mirror images of themselves give left and right legs equal torques.
-    The trunk's centre of mass of the A1 is 4 mm off the mirror plane; a guide that holds roll, yaw
-    and y takes the difference, at no cost, so left and right are equal there too.
+    The trunk's centre of mass of the A1 is 4 mm off the mirror plane; a planar constraint that
+    holds roll, yaw and y takes the difference, at no cost, so left and right are equal there too.
 
     Args:
         robot: The robot.
@@ -155,18 +157,19 @@ def inverse_dynamics(
         friction: Coefficient of friction; None for no cone and no limits.
         torque_limits: Largest torques [N m], one or (12,), where friction is given; the robot's
             own if None, none if infinite.
-        guide: Base coordinates that a guide holds, out of `GUIDE_COORDINATES`: forces along and
-            moments about the world's axes at the trunk's origin; None for a free base.
+        constraint: Base coordinates that a planar constraint holds, out of
+            `CONSTRAINT_COORDINATES`: forces along and moments about the world's axes at the trunk's
+            origin; None for a free base.
 
     Raises:
         InvalidInput: A wrong shape, NaN, a quaternion that is not normalised, friction or limits
             that are not positive.
-        UnknownName: There is no such leg, contact or guide coordinate.
+        UnknownName: There is no such leg, contact or constraint coordinate.
     """
     q, v = as_state(robot, q, v)
     batch = q.shape[:-1]
     a = as_array("a", a, robot.nv, batch)
-    legs, axes = leg_indices(robot, feet), _guide_axes(guide)
+    legs, axes = leg_indices(robot, feet), _constraint_axes(constraint)
     friction = none_or(real, "friction", friction, POSITIVE)
     limits = _torque_limits(robot, torque_limits)
     motion = (q, v, a)
@@ -190,7 +193,7 @@ def feedforward(
     contact: Contact = "point",
     friction: float | None = None,
     torque_limits: npt.ArrayLike | None = None,
-    guide: Sequence[str] | None = None,
+    constraint: Sequence[str] | None = None,
 ) -> Feedforward:
     """Torques of the model along a gait: inverse dynamics in stance and in flight.
 
@@ -205,7 +208,7 @@ def feedforward(
         contact: See `inverse_dynamics`, as the following.
         friction: For stance.
         torque_limits: For stance.
-        guide: For stance.
+        constraint: For stance.
 
     Raises:
         InvalidInput: Fewer than two samples, or as `inverse_dynamics`.
@@ -226,23 +229,25 @@ def feedforward(
         contact=contact,
         friction=friction,
         torque_limits=torque_limits,
-        guide=guide,
+        constraint=constraint,
     )
     legs = leg_indices(robot, gait.stance.feet)
     lam = np.zeros((samples, len(robot.legs), 3))
     lam[:, legs] = stance.lam.reshape(samples, len(legs), 3)
     flight = inverse_dynamics(robot, air.q, air.v, air.a, feet=())
-    return Feedforward(s, stance.tau, flight.tau, lam, stance.guide, stance.feasible)
+    return Feedforward(s, stance.tau, flight.tau, lam, stance.constraint, stance.feasible)
 
 
-def _guide_axes(guide: Sequence[str] | None) -> list[int]:
-    """Indices of the guide's coordinates."""
+def _constraint_axes(constraint: Sequence[str] | None) -> list[int]:
+    """Indices of the planar constraint's coordinates."""
     axes = [
-        GUIDE_COORDINATES.index(known_name("guide coordinate", name, GUIDE_COORDINATES))
-        for name in (() if guide is None else sequence_of("guide", guide, text))
+        CONSTRAINT_COORDINATES.index(
+            known_name("constraint coordinate", name, CONSTRAINT_COORDINATES)
+        )
+        for name in (() if constraint is None else sequence_of("guide", constraint, text))
     ]
     if len(set(axes)) != len(axes):
-        raise InvalidInput(f"guide={guide} names a coordinate twice; name each once")
+        raise InvalidInput(f"constraint={constraint} names a coordinate twice; name each once")
     return axes
 
 
@@ -293,7 +298,7 @@ def _solution(
     return InverseDynamics(
         tau=problem.torques(forces).reshape(*batch, problem.b_joints.shape[-1]) / torque_constant,
         lam=forces[..., :contacts].reshape(*batch, contacts),
-        guide=forces[..., contacts:].reshape(*batch, problem.size - contacts),
+        constraint=forces[..., contacts:].reshape(*batch, problem.size - contacts),
         residual=residual.reshape(batch),
         feasible=np.asarray(inside & (residual <= _TOLERANCE)).reshape(batch),
     )

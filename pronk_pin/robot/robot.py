@@ -70,7 +70,9 @@ class Robot:
         Raises:
             InvalidInput: Parameters of another number of joints, or a trunk without mass.
         """
-        return _mended(self.bare or self, instance_of("parameters", parameters, ModelParameters))
+        return _with_parameters(
+            self.bare or self, instance_of("parameters", parameters, ModelParameters)
+        )
 
     @property
     def name(self) -> str:
@@ -275,7 +277,7 @@ def _load(spec: RobotSpec) -> Robot:
 
 
 @lru_cache(maxsize=32)
-def _mended(bare: Robot, parameters: ModelParameters) -> Robot:
+def _with_parameters(bare: Robot, parameters: ModelParameters) -> Robot:
     if parameters == NOTHING:
         return bare
     model = bare.model.copy()

@@ -6,18 +6,18 @@ Goes out: a page, a replay, a film, figures, a report.
 
 from .figure_style import known_format, save_figure
 from .player import Film, LiveServer, play, serve, show, write_film, write_png, write_replay
-from .scenes import Mark, Programme, Scene, Track, gait_scene, library_programme
+from .scenes import Mark, Menu, Scene, Track, gait_scene, library_menu
 
 __all__ = [
     "Film",
     "LiveServer",
     "Mark",
-    "Programme",
+    "Menu",
     "Scene",
     "Track",
     "gait_scene",
     "known_format",
-    "library_programme",
+    "library_menu",
     "play",
     "save_figure",
     "serve",

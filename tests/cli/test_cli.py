@@ -14,7 +14,7 @@ from pronk_pin.cli import main
 from pronk_pin.robot import ROBOTS
 from pronk_pin.robot.formats.urdf import mujoco_spec
 
-SHORT = ["--speeds", "0.0", "0.4", "--schedule.practice", "2", "--schedule.learning", "3"]
+SHORT = ["--speeds", "0.0", "0.4", "--schedule.baseline", "2", "--schedule.learning", "3"]
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_pages_need_nothing_from_outside(result: Path) -> None:
 def test_one_speed_and_one_controller_are_a_comparison_too(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    short = ["--speeds", "0.3", "--schedule.practice", "1.5", "--schedule.learning", "0.5"]
+    short = ["--speeds", "0.3", "--schedule.baseline", "1.5", "--schedule.learning", "0.5"]
     folder = ["--folder", str(tmp_path / "one")]
     assert main(["compare", *short, "--controllers", "model", *folder]) == 0
     assert "1 of 1" in capsys.readouterr().out
@@ -94,7 +94,7 @@ def test_report_prints_the_table_again(result: Path, capsys: pytest.CaptureFixtu
     assert main(["report", str(result)]) == 0
     output = capsys.readouterr().out
     assert "paper, Table I" in output
-    assert "Practice cuts the mean peak error by" in output
+    assert "Learning cuts the mean peak error by" in output
     assert (result / "report.html").stat().st_size > 10_000
 
 

@@ -20,7 +20,7 @@ SPEEDS = (0.0, 0.45)
 EXPERIMENT = Experiment(
     speeds=SPEEDS,
     controllers=("pd", "ilc", "library"),
-    schedule=Schedule(practice=4.0, learning=6.0),
+    schedule=Schedule(baseline=4.0, learning=6.0),
 )
 
 
@@ -51,7 +51,7 @@ def simulation(robot: Robot, gaits: list[Gait]) -> Callable[..., Simulation]:
             gaits,
             spec,
             load_scenario("nominal"),
-            schedule=Schedule(startup=0.2, practice=seconds, learning=0.0),
+            schedule=Schedule(startup=0.2, baseline=seconds, learning=0.0),
             rng=np.random.default_rng(seed),
             feedforward=feedforward,
         )

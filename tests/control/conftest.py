@@ -22,9 +22,9 @@ def gaits() -> list[Gait]:
 def phase_log() -> Callable[..., PhaseLog]:
     """A log of joint angles and rates (n, ticks, 12), in which no torque acted."""
 
-    def build(joints: Array, joint_rates: Array, *, felt: int = 0) -> PhaseLog:
+    def build(joints: Array, joint_rates: Array, *, sensed: int = 0) -> PhaseLog:
         n, ticks = joints.shape[:2]
         none = np.zeros((3, *joints.shape))
-        return PhaseLog(joints, joint_rates, *none, np.full(n, ticks, np.intp), felt)
+        return PhaseLog(joints, joint_rates, *none, np.full(n, ticks, np.intp), sensed)
 
     return build

@@ -73,7 +73,7 @@ def stances(gaits: list[Gait], phase_log: Callable[..., PhaseLog]) -> Callable[.
         ticks = round(gaits[0].stance.duration / DT)
         references = [g.stance.joint_reference(_phases(g.stance.duration, ticks)) for g in gaits]
         joints, joint_rates = (np.stack(part) for part in zip(*references, strict=True))
-        return phase_log(joints - offset, joint_rates, felt=2)
+        return phase_log(joints - offset, joint_rates, sensed=2)
 
     return build
 

@@ -38,7 +38,7 @@ def test_where_the_model_is_right_its_torques_replace_the_feedback(
             gaits,
             load_controller(name),
             load_scenario("ideal"),
-            schedule=Schedule(practice=3.0, learning=0.0, scatter=0.0),
+            schedule=Schedule(baseline=3.0, learning=0.0, scatter=0.0),
             rng=np.random.default_rng(0),
             feedforward=feedforward,
         )

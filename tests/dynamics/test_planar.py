@@ -1,4 +1,4 @@
-"""The guided robot's derivatives against finite differences of its forward dynamics."""
+"""The planar robot's derivatives against finite differences of its forward dynamics."""
 
 from __future__ import annotations
 

@@ -159,7 +159,7 @@ def test_a_gait_that_is_not_found_costs_no_other(robot: Robot, tmp_path: Path) -
     with pytest.raises(GaitNotFound, match=r"apex 0.34 m; the other 1 gaits are in") as caught:
         build_library(robot, [0.0, 6.0], folder=tmp_path, progress=False, sequence=QUICK)
     assert caught.value.speed == 6.0
-    assert caught.value.fights
+    assert caught.value.conflicts
     assert len(files(tmp_path)) == 1
 
 

@@ -14,8 +14,8 @@ from pronk_pin._typing import Array
 from pronk_pin.errors import InvalidInput, UnknownName
 from pronk_pin.gait.gait import Gait, GaitPhase
 from pronk_pin.inverse_dynamics import (
-    GUIDE_COORDINATES,
-    SAGITTAL_GUIDE,
+    CONSTRAINT_COORDINATES,
+    PLANAR_CONSTRAINT,
     InverseDynamics,
     distribute_wrench,
     feedforward,
@@ -42,14 +42,17 @@ def violation(
     *,
     feet: tuple[str, ...] | None = None,
     contact: str = "point",
-    guide: tuple[str, ...] = (),
+    constraint: tuple[str, ...] = (),
 ) -> float:
-    """Largest error of eq. (2) of the paper, from its own matrices, with the guide's forces."""
+    """Largest error of eq. (2) of the paper, from its own matrices, with the planar constraint's
+    forces."""
     worst = 0.0
     for row, (q, v, a) in enumerate(zip(*motion, strict=True)):
         jacobian = dynamics.contact_jacobian(robot, q, feet=feet, contact=contact)
         wrench = np.zeros(6)
-        wrench[[GUIDE_COORDINATES.index(name) for name in guide]] = solution.guide[row]
+        wrench[[CONSTRAINT_COORDINATES.index(name) for name in constraint]] = solution.constraint[
+            row
+        ]
         into_trunk = rotation_matrix(q[3:7]).T
         applied = np.concatenate([into_trunk @ wrench[:3], into_trunk @ wrench[3:], np.zeros(12)])
         applied += dynamics.selection_matrix(robot) @ solution.tau[row]
@@ -156,9 +159,11 @@ def test_proxqp_finds_what_another_solver_finds(robot: Robot, crouches: Draw) ->
 
 def test_a_warm_start_changes_nothing(robot: Robot, crouches: Draw) -> None:
     q, v, a, _ = crouches(20)
-    batch = inverse_dynamics(robot, q, v, a, friction=0.4, guide=SAGITTAL_GUIDE)
+    batch = inverse_dynamics(robot, q, v, a, friction=0.4, constraint=PLANAR_CONSTRAINT)
     for row in range(20):
-        one = inverse_dynamics(robot, q[row], v[row], a[row], friction=0.4, guide=SAGITTAL_GUIDE)
+        one = inverse_dynamics(
+            robot, q[row], v[row], a[row], friction=0.4, constraint=PLANAR_CONSTRAINT
+        )
         np.testing.assert_allclose(batch.tau[row], one.tau, atol=1e-6)
         assert batch.feasible[row] == one.feasible
 
@@ -228,10 +233,10 @@ def test_left_and_right_share_a_symmetric_motion(
 ) -> None:
     motion = mirrored_motion(robot)
     solution = inverse_dynamics(
-        robot, *motion, friction=friction, contact=contact, guide=SAGITTAL_GUIDE
+        robot, *motion, friction=friction, contact=contact, constraint=PLANAR_CONSTRAINT
     )
     assert solution.feasible.all()
-    assert violation(robot, motion, solution, contact=contact, guide=SAGITTAL_GUIDE) < 1e-9
+    assert violation(robot, motion, solution, contact=contact, constraint=PLANAR_CONSTRAINT) < 1e-9
     legs = solution.tau.reshape(-1, 4, 3)
     mirror = np.array([-1.0, 1.0, 1.0])
     np.testing.assert_allclose(legs[:, [0, 2]], legs[:, [1, 3]] * mirror, atol=1e-6)
@@ -239,12 +244,12 @@ def test_left_and_right_share_a_symmetric_motion(
 
 def test_the_guide_carries_the_trunk_that_is_off_centre(robot: Robot) -> None:
     rest = np.zeros(18)
-    held = inverse_dynamics(robot, robot.standing, rest, rest, guide=SAGITTAL_GUIDE)
+    held = inverse_dynamics(robot, robot.standing, rest, rest, constraint=PLANAR_CONSTRAINT)
     trunk = robot.model.inertias[1]
     moment = trunk.mass * robot.gravity * trunk.lever[1]
-    np.testing.assert_allclose(held.guide[[0, 1, 3]], [0.0, moment, 0.0], atol=1e-9)
+    np.testing.assert_allclose(held.constraint[[0, 1, 3]], [0.0, moment, 0.0], atol=1e-9)
     alone = inverse_dynamics(robot, robot.standing, rest, rest)
-    assert alone.guide.shape == (0,)
+    assert alone.constraint.shape == (0,)
     assert np.linalg.norm(held.tau) < np.linalg.norm(alone.tau)
 
 
@@ -252,15 +257,15 @@ def test_a_guide_of_all_coordinates_holds_a_robot_in_the_air(
     robot: Robot, random_states: Draw
 ) -> None:
     q, v, a, _ = random_states(5)
-    solution = inverse_dynamics(robot, q, v, a, feet=(), guide=GUIDE_COORDINATES)
+    solution = inverse_dynamics(robot, q, v, a, feet=(), constraint=CONSTRAINT_COORDINATES)
     assert solution.feasible.all()
-    assert violation(robot, (q, v, a), solution, feet=(), guide=GUIDE_COORDINATES) < 1e-9
+    assert violation(robot, (q, v, a), solution, feet=(), constraint=CONSTRAINT_COORDINATES) < 1e-9
 
 
 def test_a_batch_of_any_shape_is_taken(robot: Robot, crouches: Draw) -> None:
     shaped = (x.reshape(2, 3, -1) for x in crouches(6)[:3])
     solution = inverse_dynamics(
-        robot, *shaped, friction=FRICTION, guide=("yaw",), feet=("FL", "RR")
+        robot, *shaped, friction=FRICTION, constraint=("yaw",), feet=("FL", "RR")
     )
     shapes = [part.shape for part in solution]
     assert shapes == [(2, 3, 12), (2, 3, 6), (2, 3, 1), (2, 3), (2, 3)]
@@ -278,10 +283,12 @@ def hop(robot: Robot) -> Gait:
 
 
 def test_feedforward_covers_stance_and_flight(robot: Robot) -> None:
-    result = feedforward(robot, hop(robot), samples=7, friction=FRICTION, guide=SAGITTAL_GUIDE)
+    result = feedforward(
+        robot, hop(robot), samples=7, friction=FRICTION, constraint=PLANAR_CONSTRAINT
+    )
     rest = np.zeros(18)
     static = inverse_dynamics(
-        robot, robot.standing, rest, rest, friction=FRICTION, guide=SAGITTAL_GUIDE
+        robot, robot.standing, rest, rest, friction=FRICTION, constraint=PLANAR_CONSTRAINT
     )
     assert result.feasible.all()
     np.testing.assert_array_equal(result.s, np.linspace(0, 1, 7))
@@ -299,10 +306,10 @@ def test_wrong_arguments_are_refused_with_a_remedy(robot: Robot) -> None:
         inverse_dynamics(robot, *state, friction=0.0)
     with pytest.raises(InvalidInput, match="torque_limits must be one or 12 positive"):
         inverse_dynamics(robot, *state, friction=0.5, torque_limits=[1.0, 2.0])
-    with pytest.raises(UnknownName, match="guide coordinate 'heave'"):
-        inverse_dynamics(robot, *state, guide=("heave",))
+    with pytest.raises(UnknownName, match="constraint coordinate 'heave'"):
+        inverse_dynamics(robot, *state, constraint=("heave",))
     with pytest.raises(InvalidInput, match="name each once"):
-        inverse_dynamics(robot, *state, guide=("y", "y"))
+        inverse_dynamics(robot, *state, constraint=("y", "y"))
     with pytest.raises(InvalidInput, match="samples=1; give a whole number from 2 to 100000"):
         feedforward(robot, hop(robot), samples=1)
 

@@ -1,4 +1,4 @@
-"""A mended model is the same robot in MuJoCo, and every part of the package uses it."""
+"""A identified model is the same robot in MuJoCo, and every part of the package uses it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from pronk_pin.gait import gait_problem, optimize_gait
 from pronk_pin.gait.residual import missing_forces
 from pronk_pin.inverse_dynamics import inverse_dynamics
 from pronk_pin.robot.conventions import from_mujoco, to_mujoco
-from pronk_pin.robot.formats.model_files import mended_spec, write_mjcf, write_urdf
+from pronk_pin.robot.formats.model_files import parametrised_spec, write_mjcf, write_urdf
 
 Draw = Callable[..., tuple[Array, Array, Array, Array]]
 
@@ -48,23 +48,23 @@ PARAMETERS = ModelParameters(
 
 
 @pytest.fixture(scope="session")
-def mended(any_robot: Robot) -> Robot:
+def identified(any_robot: Robot) -> Robot:
     return any_robot.with_parameters(PARAMETERS)
 
 
 @pytest.fixture(scope="session")
-def mended_a1(robot: Robot) -> Robot:
+def identified_a1(robot: Robot) -> Robot:
     return robot.with_parameters(PARAMETERS)
 
 
 def test_parameters_replace_those_before_and_go_again(robot: Robot) -> None:
-    mended = robot.with_parameters(PARAMETERS)
-    assert mended.mass == pytest.approx(robot.mass + 2.5)
-    again = mended.with_parameters(ModelParameters(payload=1.0))
+    identified = robot.with_parameters(PARAMETERS)
+    assert identified.mass == pytest.approx(robot.mass + 2.5)
+    again = identified.with_parameters(ModelParameters(payload=1.0))
     assert again.mass == pytest.approx(robot.mass + 1.0)
     assert again.with_parameters(ModelParameters()) is robot
-    assert robot.with_parameters(PARAMETERS) is mended
-    assert len({robot.sha256, mended.sha256, again.sha256}) == 3
+    assert robot.with_parameters(PARAMETERS) is identified
+    assert len({robot.sha256, identified.sha256, again.sha256}) == 3
 
 
 def test_a_payload_is_a_point_and_a_shift_moves_the_trunk_alone(robot: Robot) -> None:
@@ -79,37 +79,44 @@ def test_a_payload_is_a_point_and_a_shift_moves_the_trunk_alone(robot: Robot) ->
     np.testing.assert_allclose(back.toDynamicParameters(), own.toDynamicParameters(), atol=1e-12)
 
 
-def test_flight_agrees_with_mujoco_with_rotors_friction_motors_and_load(mended: Robot) -> None:
-    model = mended_spec(mended).compile()
+def test_flight_agrees_with_mujoco_with_rotors_friction_motors_and_load(identified: Robot) -> None:
+    model = parametrised_spec(identified).compile()
     # Coulomb friction is a constraint there: sliding fast, and stiff, it is the force it should be.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     data = mujoco.MjData(model)
     rng = np.random.default_rng(1)
-    joints = [model.actuator(name).id for name in mended.joint_names]
+    joints = [model.actuator(name).id for name in identified.joint_names]
     for _ in range(20):
-        q = pin.integrate(mended.model, mended.standing, 0.2 * rng.standard_normal(mended.nv))
-        v = rng.standard_normal(mended.nv)
+        q = pin.integrate(
+            identified.model, identified.standing, 0.2 * rng.standard_normal(identified.nv)
+        )
+        v = rng.standard_normal(identified.nv)
         v[6:] = np.where(v[6:] < 0.0, -1.0, 1.0) * (2.0 + np.abs(v[6:]))
-        tau = 3.0 * rng.standard_normal(mended.nu)
-        state = to_mujoco(mended, q, v)
+        tau = 3.0 * rng.standard_normal(identified.nu)
+        state = to_mujoco(identified, q, v)
         data.qpos[:], data.qvel[:] = state.qpos, state.qvel
         data.ctrl[joints] = tau
         mujoco.mj_forward(model, data)
-        ours = from_mujoco(mended, data.qpos, data.qvel, data.qacc).a
-        expected = flight_dynamics(mended, q, v, tau)
+        ours = from_mujoco(identified, data.qpos, data.qvel, data.qacc).a
+        expected = flight_dynamics(identified, q, v, tau)
         np.testing.assert_allclose(ours, expected, rtol=1e-4, atol=1e-3 * np.abs(expected).max())
 
 
-def test_inverse_dynamics_asks_for_what_makes_the_motion(mended_a1: Robot, crouches: Draw) -> None:
+def test_inverse_dynamics_asks_for_what_makes_the_motion(
+    identified_a1: Robot, crouches: Draw
+) -> None:
     q, v, _, tau = crouches(50)
     for feet in ((), None):
-        a = stance_dynamics(mended_a1, q, v, tau, feet=feet).a
-        answer = inverse_dynamics(mended_a1, q, v, a, feet=feet)
+        a = stance_dynamics(identified_a1, q, v, tau, feet=feet).a
+        answer = inverse_dynamics(identified_a1, q, v, a, feet=feet)
         assert answer.feasible.all()
-        again = stance_dynamics(mended_a1, q, v, answer.tau, feet=feet).a
+        again = stance_dynamics(identified_a1, q, v, answer.tau, feet=feet).a
         np.testing.assert_allclose(again, a, atol=1e-6)
     np.testing.assert_allclose(
-        inverse_dynamics(mended_a1, q, v, flight_dynamics(mended_a1, q, v, tau), feet=()).tau, tau
+        inverse_dynamics(
+            identified_a1, q, v, flight_dynamics(identified_a1, q, v, tau), feet=()
+        ).tau,
+        tau,
     )
 
 
@@ -121,41 +128,43 @@ def test_limits_are_those_of_the_torques_asked_for(robot: Robot, crouches: Draw)
     assert np.abs(answer.tau[answer.feasible]).max() <= limit + 1e-5
 
 
-def test_stance_obeys_its_dae_and_the_impact_has_rotors(mended_a1: Robot, crouches: Draw) -> None:
+def test_stance_obeys_its_dae_and_the_impact_has_rotors(
+    identified_a1: Robot, crouches: Draw
+) -> None:
     q, v, _, tau = (rows[0] for rows in crouches(1))
-    dae = stance_dae(mended_a1, q, v, tau)
-    stance = stance_dynamics(mended_a1, q, v, tau)
+    dae = stance_dae(identified_a1, q, v, tau)
+    stance = stance_dynamics(identified_a1, q, v, tau)
     np.testing.assert_allclose(
         dae.matrix @ np.concatenate([stance.a, stance.lam]), dae.rhs, atol=1e-8
     )
-    after, jacobian = impact(mended_a1, q, v), contact_jacobian(mended_a1, q)
+    after, jacobian = impact(identified_a1, q, v), contact_jacobian(identified_a1, q)
     np.testing.assert_allclose(
-        mass_matrix(mended_a1, q) @ (after.v - v), jacobian.T @ after.impulse, atol=1e-9
+        mass_matrix(identified_a1, q) @ (after.v - v), jacobian.T @ after.impulse, atol=1e-9
     )
-    rotors = np.diag(mass_matrix(mended_a1, q) - mass_matrix(mended_a1.bare, q))[6:]
+    rotors = np.diag(mass_matrix(identified_a1, q) - mass_matrix(identified_a1.bare, q))[6:]
     np.testing.assert_allclose(rotors, np.tile(PARAMETERS.armature, 4))
 
 
 @pytest.mark.parametrize("contact", ["flight", "point", "rolling"])
 def test_derivatives_are_those_of_finite_differences(
-    mended_a1: Robot, crouches: Draw, contact: str
+    identified_a1: Robot, crouches: Draw, contact: str
 ) -> None:
     q, v, _, tau = (rows[0] for rows in crouches(1))
 
     def acceleration(q: Array, v: Array, tau: Array) -> Array:
         if contact == "flight":
-            return flight_dynamics(mended_a1, q, v, tau)
-        return stance_dynamics(mended_a1, q, v, tau, contact=contact).a  # type: ignore[arg-type]
+            return flight_dynamics(identified_a1, q, v, tau)
+        return stance_dynamics(identified_a1, q, v, tau, contact=contact).a  # type: ignore[arg-type]
 
     if contact == "flight":
-        found = flight_derivatives(mended_a1, q, v, tau)
+        found = flight_derivatives(identified_a1, q, v, tau)
     else:
-        found = stance_derivatives(mended_a1, q, v, tau, contact=contact)  # type: ignore[arg-type,assignment]
+        found = stance_derivatives(identified_a1, q, v, tau, contact=contact)  # type: ignore[arg-type,assignment]
     step = 1e-6
     for k in range(18):
         d = step * np.eye(18)[k]
-        by_q = acceleration(pin.integrate(mended_a1.model, q, d), v, tau)
-        by_q -= acceleration(pin.integrate(mended_a1.model, q, -d), v, tau)
+        by_q = acceleration(pin.integrate(identified_a1.model, q, d), v, tau)
+        by_q -= acceleration(pin.integrate(identified_a1.model, q, -d), v, tau)
         by_v = acceleration(q, v + d, tau) - acceleration(q, v - d, tau)
         scale = np.abs(found.da_dq).max()
         np.testing.assert_allclose(by_q / (2 * step), found.da_dq[:, k], atol=1e-6 * scale)
@@ -166,62 +175,68 @@ def test_derivatives_are_those_of_finite_differences(
         np.testing.assert_allclose(by_tau / 2.0, found.da_dtau[:, k], atol=1e-6 * scale)
 
 
-def test_the_guided_derivatives_know_friction_and_motors(robot: Robot, mended_a1: Robot) -> None:
+def test_the_guided_derivatives_know_friction_and_motors(
+    robot: Robot, identified_a1: Robot
+) -> None:
     rng, step = np.random.default_rng(2), 1e-6
     q, v, tau = robot.standing, np.zeros(18), 3.0 * rng.standard_normal(12)
     v[6:] = 0.2 * rng.standard_normal(12)
-    found = planar_derivatives(mended_a1, q, v, tau, contact="rolling")
+    found = planar_derivatives(identified_a1, q, v, tau, contact="rolling")
     for k, row in enumerate(planar_rows(robot)):
         d = step * np.eye(18)[row]
         high, low = (
-            planar_derivatives(mended_a1, q, v + sign * d, tau, contact="rolling").a
+            planar_derivatives(identified_a1, q, v + sign * d, tau, contact="rolling").a
             for sign in (1.0, -1.0)
         )
         scale = np.abs(found.da_dv).max()
         np.testing.assert_allclose((high - low) / (2 * step), found.da_dv[:, k], atol=1e-6 * scale)
 
 
-def test_a_simulation_accounts_for_what_friction_takes(mended_a1: Robot) -> None:
-    tau = inverse_dynamics(mended_a1, mended_a1.standing, mended_a1.at_rest, mended_a1.at_rest).tau
-    run = simulate_phase(mended_a1, mended_a1.standing, mended_a1.at_rest, 0.8 * tau, duration=0.1)
+def test_a_simulation_accounts_for_what_friction_takes(identified_a1: Robot) -> None:
+    tau = inverse_dynamics(
+        identified_a1, identified_a1.standing, identified_a1.at_rest, identified_a1.at_rest
+    ).tau
+    run = simulate_phase(
+        identified_a1, identified_a1.standing, identified_a1.at_rest, 0.8 * tau, duration=0.1
+    )
     assert run.energy_drift < 1e-6
     assert np.abs(run.v[-1, 6:]).max() > 0.1
 
 
 def test_a_gait_of_the_mended_model_obeys_its_equations(robot: Robot) -> None:
-    mended = robot.with_parameters(
+    identified = robot.with_parameters(
         ModelParameters((0.01,) * 3, (0.1,) * 3, (0.2,) * 3, 1.0, torque_constant=0.9)
     )
-    solution = optimize_gait(gait_problem(mended, 0.3))
+    solution = optimize_gait(gait_problem(identified, 0.3))
     rows = planar_rows(robot)
     for motion in solution.motions.values():
-        assert np.abs(missing_forces(mended, motion, "rolling")[:, rows]).max() < 1e-6
+        assert np.abs(missing_forces(identified, motion, "rolling")[:, rows]).max() < 1e-6
         assert np.abs(missing_forces(robot, motion, "rolling")[:, rows]).max() > 1.0
     landing, stance = solution.motions["flight"].v[-1], solution.motions["stance"]
-    after = planar_impact(mended, stance.q[0], landing[None, rows], contact="rolling")[0]
+    after = planar_impact(identified, stance.q[0], landing[None, rows], contact="rolling")[0]
     np.testing.assert_allclose(after, stance.v[0, rows], atol=1e-6)
 
 
-def test_written_models_are_read_as_the_same_robot(mended: Robot, tmp_path: Path) -> None:
-    notes = ["identified -- by practice", "armature 0.01"]
-    mjcf = write_mjcf(mended, tmp_path / "robot.xml", notes)
+def test_written_models_are_read_as_the_same_robot(identified: Robot, tmp_path: Path) -> None:
+    notes = ["identified -- by learning", "armature 0.01"]
+    mjcf = write_mjcf(identified, tmp_path / "robot.xml", notes)
     model = mujoco.MjModel.from_xml_path(str(mjcf))
-    body = model.body(mended.spec.base_link)
-    assert float(body.mass[0]) == pytest.approx(mended.model.inertias[1].mass, rel=1e-5)
-    np.testing.assert_allclose(body.ipos, mended.model.inertias[1].lever, atol=1e-6)
-    for name, value in zip(mended.joint_names, mended.of_joint("armature"), strict=True):
+    body = model.body(identified.spec.base_link)
+    assert float(body.mass[0]) == pytest.approx(identified.model.inertias[1].mass, rel=1e-5)
+    np.testing.assert_allclose(body.ipos, identified.model.inertias[1].lever, atol=1e-6)
+    for name, value in zip(identified.joint_names, identified.of_joint("armature"), strict=True):
         assert float(model.joint(name).armature[0]) == pytest.approx(value, rel=1e-5)
         assert float(model.joint(name).frictionloss[0]) > 0.0
-    assert "identified - - by practice" in mjcf.read_text()
+    assert "identified - - by learning" in mjcf.read_text()
 
-    urdf = write_urdf(mended, tmp_path / "robot.urdf", notes)
+    urdf = write_urdf(identified, tmp_path / "robot.urdf", notes)
     read = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
     np.testing.assert_allclose(
         read.inertias[1].toDynamicParameters(),
-        mended.model.inertias[1].toDynamicParameters(),
+        identified.model.inertias[1].toDynamicParameters(),
         atol=1e-9,
     )
-    np.testing.assert_allclose(read.damping[6:], mended.of_joint("damping"))
+    np.testing.assert_allclose(read.damping[6:], identified.of_joint("damping"))
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definit
     """
     cells = experiment.cells()
     if mjcf_sha256 is None:
-        mjcf_sha256 = mjcf_digest(experiment.world) if experiment.world else ""
+        mjcf_sha256 = mjcf_digest(experiment.mjcf) if experiment.mjcf else ""
     return {
         "robot": _robot(experiment.robot),
         "base": experiment.base,
@@ -65,7 +65,7 @@ def _robot(name: str) -> Definition:
 
 def cell_definition(definition: Definition, cell: Cell) -> Definition:
     """What one simulation of an experiment depends on, out of the experiment's definition."""
-    source = cell.practised
+    source = cell.depends_on
     return {
         **{key: definition[key] for key in ("robot", "base", "mjcf_sha256", "schedule")},
         "gaits": {repr(speed): definition["gaits"][repr(speed)] for speed in cell.speeds},

@@ -18,12 +18,12 @@ from ..._workers import count_steps as count_steps  # for those who are handed a
 from ...errors import ExecutorUnavailable, InvalidInput
 from ...storage import temporary_folder
 
-_PATIENCE = 10.0
+_TIMEOUT = 10.0
 """Timeout of a scheduler's answer [s]."""
 
 
 @dataclass(frozen=True)
-class Crew:
+class WorkerPool:
     """A pool of workers: its executor, and how to count, stop and judge its work.
 
     Attributes:
@@ -42,7 +42,7 @@ class Crew:
 
 
 @contextmanager
-def processes(count: int) -> Iterator[Crew]:
+def processes(count: int) -> Iterator[WorkerPool]:
     """Start a pool of processes on this machine.
 
     Raises:
@@ -63,7 +63,7 @@ def processes(count: int) -> Iterator[Crew]:
         ) as pool,
     ):
         name = f"{count} process{'es' if count > 1 else ''}"
-        yield Crew(pool, name, steps=lambda: counter.value, stop=stop)
+        yield WorkerPool(pool, name, steps=lambda: counter.value, stop=stop)
 
 
 def known_address(address: str) -> str:
@@ -82,7 +82,7 @@ def known_address(address: str) -> str:
 
 
 @contextmanager
-def connect(address: str) -> Iterator[Crew]:
+def connect(address: str) -> Iterator[WorkerPool]:
     """Connect to the workers of a dask scheduler.
 
     Args:
@@ -102,14 +102,14 @@ def connect(address: str) -> Iterator[Crew]:
             address, "dask.distributed is not installed", "pip install 'pronk-pin[dask]'"
         ) from error
     try:
-        client = Client(f"tcp://{place}", timeout=_PATIENCE, set_as_default=False)
+        client = Client(f"tcp://{place}", timeout=_TIMEOUT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ExecutorUnavailable(
             address, f"no scheduler answers ({error})", "start one with 'dask scheduler'"
         ) from error
     with client:
         workers = _check_workers(client, address)
-        yield Crew(
+        yield WorkerPool(
             client.get_executor(pure=False),
             f"{address}, {workers} worker{'s' if workers != 1 else ''}",
             lost=(BrokenExecutor, KilledWorker, CancelledError, OSError),
@@ -127,14 +127,15 @@ def _check_workers(client: object, address: str) -> int:
         except PackageNotFoundError:
             return None
 
-    client.wait_for_workers(1, timeout=_PATIENCE)  # type: ignore[attr-defined]
-    found: dict[str, str | None] = client.run(installed)  # type: ignore[attr-defined]
-    ours = importlib.metadata.version("pronk-pin")
-    for worker, theirs in sorted(found.items()):
-        if theirs != ours:
+    client.wait_for_workers(1, timeout=_TIMEOUT)  # type: ignore[attr-defined]
+    versions: dict[str, str | None] = client.run(installed)  # type: ignore[attr-defined]
+    own_version = importlib.metadata.version("pronk-pin")
+    for worker, worker_version in sorted(versions.items()):
+        if worker_version != own_version:
             raise ExecutorUnavailable(
                 address,
-                f"worker {worker} has pronk-pin {theirs or 'not installed'}, not {ours}",
+                f"worker {worker} has pronk-pin {worker_version or 'not installed'}, "
+                f"not {own_version}",
                 "install the same version there",
             )
-    return len(found)
+    return len(versions)

@@ -19,7 +19,7 @@ from tyro.conf import Suppress
 from ..._checks import instance_of, known_name, path, real, seed, sequence_of, text
 from ...control import (
     ControllerSpec,
-    Skill,
+    InitialFeedforward,
     TorqueLibrary,
     load_controller,
     model_feedforward,
@@ -28,7 +28,7 @@ from ...control import (
 from ...errors import InvalidInput
 from ...gait import SPEEDS, Gait, GaitLibrary, load_library
 from ...robot import BASES, ROBOTS, Robot, load_robot
-from ..identification import explain, mended_gaits
+from ..identification import explain, identified_gaits
 from ..metrics import steady
 from ..simulation import Progress, Schedule, Simulation, to_dataset
 from ..world import load_scenario
@@ -39,8 +39,8 @@ LEARNED = ("library", "identified")
 
 DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
 
-PRACTISED = ("count", "learning", "feedforward", "flight_reference")
-"""What of a practised cell's strides the torque library is made of."""
+LIBRARY_VARIABLES = ("count", "learning", "feedforward", "flight_reference")
+"""What of a learned cell's strides the torque library is made of."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ class Experiment:
         robot: Short name of the robot.
         speeds: Desired speeds [m/s].
         controllers: Short names of the controllers: any of `control.CONTROLLERS`.
-        scenarios: Names of the worlds, composed with "+", values with "=": nominal, ideal,
+        scenarios: Names of the scenarios, composed with "+", values with "=": nominal, ideal,
             payload=2+slope, random-0-3; see `compare.world.scenario`.
         seeds: Seeds of the scatter at the start.
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
-        world: MJCF of the robot, with the same joint names, that stands in for its URDF in the
+        mjcf: MJCF of the robot, with the same joint names, that stands in for its URDF in the
             simulation; see `compare.world.mjcf`. The scenarios add to what is in it: "ideal" takes
             it
             as it is. The file is read when the experiment is run, and not before.
@@ -70,7 +70,7 @@ class Experiment:
     scenarios: tuple[str, ...] = ("nominal",)
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
-    world: str = ""
+    mjcf: str = ""
     schedule: Schedule = field(default_factory=Schedule)
     batches: Annotated[tuple[tuple[float, ...], ...], Suppress] = ()
 
@@ -92,8 +92,8 @@ class Experiment:
                     f"controller '{controller}' identifies the robot on the locked base; leave it "
                     "out, or use base 'locked'"
                 )
-        if self.world:
-            object.__setattr__(self, "world", str(Path(self.world).expanduser().resolve()))
+        if self.mjcf:
+            object.__setattr__(self, "mjcf", str(Path(self.mjcf).expanduser().resolve()))
         object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
         self._sort_batches()
 
@@ -145,8 +145,8 @@ class Experiment:
             if len(values) > most:
                 raise InvalidInput(f"{len(values)} {name}; give {most} or fewer")
             keep(self, name, values)
-        if not isinstance(self.world, str) or self.world:
-            keep(self, "world", str(path("world", self.world)))
+        if not isinstance(self.mjcf, str) or self.mjcf:
+            keep(self, "mjcf", str(path("mjcf", self.mjcf)))
         instance_of("schedule", self.schedule, Schedule)
 
     def cells(self) -> tuple[Cell, ...]:
@@ -164,7 +164,7 @@ class Experiment:
                 scenario,
                 seed,
                 self.base,
-                self.world,
+                self.mjcf,
                 self.schedule,
                 batch,
             )
@@ -177,7 +177,7 @@ class Experiment:
 
 def _fixed(one: Experiment, other: Experiment) -> Iterator[tuple[str, object, object]]:
     """What cannot be added to: name, and its value in either of two experiments."""
-    for name in ("robot", "base", "world"):
+    for name in ("robot", "base", "mjcf"):
         yield name, getattr(one, name), getattr(other, name)
     for part in dataclasses.fields(Schedule):
         name = part.name
@@ -197,7 +197,7 @@ class Cell:
     scenario: str
     seed: int
     base: str
-    world: str
+    mjcf: str
     schedule: Schedule
     batch: int = 0
 
@@ -217,13 +217,13 @@ class Cell:
             scenarios=(self.scenario,),
             seeds=(self.seed,),
             base=self.base,
-            world=self.world,
+            mjcf=self.mjcf,
             schedule=self.schedule,
         )
 
     @property
-    def practised(self) -> Cell | None:
-        """The cell that learns what this one uses: the torque library, or the mended model."""
+    def depends_on(self) -> Cell | None:
+        """The cell that learns what this one uses: the torque library, or the identified model."""
         if load_controller(self.controller).source not in LEARNED:
             return None
         return dataclasses.replace(self, controller="ilc")
@@ -231,32 +231,32 @@ class Cell:
     @property
     def steps(self) -> int:
         """Time steps of the simulation."""
-        seconds = self.schedule.practice + self.schedule.learning
+        seconds = self.schedule.baseline + self.schedule.learning
         return round(seconds / load_scenario(self.scenario).timestep)
 
 
 def run_cell(
-    cell: Cell, practised: xr.Dataset | None = None, progress: Progress | None = None
+    cell: Cell, dependency: xr.Dataset | None = None, progress: Progress | None = None
 ) -> xr.Dataset:
     """Simulate a cell.
 
     Args:
         cell: Its description.
-        practised: The strides of `cell.practised`, where there is such a cell.
+        learned: The strides of `cell.learned_strides`, where there is such a cell.
         progress: Called with the number of time steps done since the last call.
 
     Returns:
         The strides: see `compare.simulation.dataset`.
     """
     instance_of("cell", cell, Cell, "a Cell, one of Experiment.cells()")
-    robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.world)
+    robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.mjcf)
     library, spec = _gaits(cell.robot, cell.base), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]
-    mended = robot
+    identified = robot
     if spec.source == "identified":
-        mended = explain(_learned(spec, practised)).mended
-        gaits = mended_gaits(mended, gaits) if spec.mended_gaits else gaits
-    first = _begin(spec, mended, gaits, practised, cell.base)
+        identified = explain(_learned(spec, dependency)).identified
+        gaits = identified_gaits(identified, gaits) if spec.identified_gaits else gaits
+    initial = _begin(spec, identified, gaits, dependency, cell.base)
     # One stream a seed, the same for every controller: they start from the same postures.
     rng = np.random.default_rng(np.random.SeedSequence(cell.seed))
     simulation = Simulation(
@@ -266,8 +266,8 @@ def run_cell(
         scenario,
         schedule=cell.schedule,
         rng=rng,
-        feedforward=first.feedforward,
-        flight=first.flight,
+        feedforward=initial.feedforward,
+        flight=initial.flight,
         base=cell.base,
     )
     log = simulation.run(progress)
@@ -294,27 +294,27 @@ def _begin(
     spec: ControllerSpec,
     robot: Robot,
     gaits: Sequence[Gait],
-    practised: xr.Dataset | None,
+    dependency: xr.Dataset | None,
     base: str,
-) -> Skill:
+) -> InitialFeedforward:
     """What a controller begins with."""
     if spec.source in ("model", "identified"):
-        return Skill(model_feedforward(robot, gaits, base=base))
+        return InitialFeedforward(model_feedforward(robot, gaits, base=base))
     if spec.source == "library":
-        learned = torque_library(_learned(spec, practised))
+        learned = torque_library(_learned(spec, dependency))
         speeds = np.array([gait.speed for gait in gaits])
-        return learned.skill(speeds)
-    return Skill()
+        return learned.initial_feedforward(speeds)
+    return InitialFeedforward()
 
 
-def _learned(spec: ControllerSpec, practised: xr.Dataset | None) -> xr.Dataset:
-    if practised is None:
+def _learned(spec: ControllerSpec, dependency: xr.Dataset | None) -> xr.Dataset:
+    if dependency is None:
         raise InvalidInput(f"controller '{spec.name}' begins with what 'ilc' has learned; run it")
-    return practised
+    return dependency
 
 
 def _attributes(cell: Cell) -> dict[str, str | int | float]:
-    scenario = load_scenario(cell.scenario, mjcf=cell.world)
+    scenario = load_scenario(cell.scenario, mjcf=cell.mjcf)
     definition = cell_definition(define(cell.experiment), cell)
     return {
         "robot": cell.robot,
@@ -323,10 +323,10 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "controller": cell.controller,
         "seed": cell.seed,
         "scenario_parameters": scenario.to_json(),
-        "world": cell.world,
-        "world_sha256": definition["mjcf_sha256"],
+        "mjcf": cell.mjcf,
+        "mjcf_sha256": definition["mjcf_sha256"],
         "timestep": scenario.timestep,
-        "switch": cell.schedule.practice,
+        "switch": cell.schedule.baseline,
         "definition": to_text(definition),
         "fingerprint": fingerprint(definition),
     }

@@ -7,7 +7,7 @@ config.json            the experiment and its definition: who has it can make th
 manifest.json          SHA-256 of the strides, the summary and parity.json
 strides/<cell>.nc      every stride of one simulation (NetCDF-4), see `compare.simulation.dataset`
 summary.csv            one long table, see `compare.metrics`
-parity.json            with another robot's MJCF only (`Experiment.world`): what that has otherwise
+parity.json            with another robot's MJCF only (`Experiment.mjcf`): what that has otherwise
 provenance.json        versions, machine, state of the source, times: not the same twice
 report.html, .md       tables and figures
 replay.html            the robot beside the reference, in one file
@@ -51,7 +51,7 @@ from ...storage import (
     sealed,
     write_file,
 )
-from ..metrics import COLUMNS, KEYS, practice, rows_of_beating, summarize
+from ..metrics import COLUMNS, KEYS, beat_rows, peak_history, summarize
 from ..world import ForeignRobot, mjcf_sha256
 from .definition import Definition, cell_definition, define, differences, fingerprint
 from .experiment import Cell, Experiment
@@ -110,8 +110,8 @@ class Results:
         if not resimulate:
             results._check_strides() if stored is None else stored._check_definition(definition)
         foreign = None
-        if experiment.world and known is None:
-            foreign = ForeignRobot.read(load_robot(experiment.robot), experiment.world)
+        if experiment.mjcf and known is None:
+            foreign = ForeignRobot.read(load_robot(experiment.robot), experiment.mjcf)
         results._make_folder()
         if foreign is not None:
             results._manifest.write(_PARITY, foreign.to_json())
@@ -233,8 +233,8 @@ class Results:
         if not path.is_file():
             return {"finished": False, "runs": []}
         remedy = "delete it: only the record of who made it is lost"
-        known = as_type(read_sealed(path, remedy), _Provenance, path, remedy)
-        return dataclasses.asdict(known)
+        stored = as_type(read_sealed(path, remedy), _Provenance, path, remedy)
+        return dataclasses.asdict(stored)
 
     def write_provenance(self, provenance: Mapping[str, Any]) -> None:
         """Write provenance.json."""
@@ -267,7 +267,7 @@ class Results:
         Raises:
             FileProblem: parity.json is missing or damaged.
         """
-        if not self.experiment.world:
+        if not self.experiment.mjcf:
             return None
         path = self.folder / _PARITY
         remedy = "run the same 'pronk-pin compare --folder' again"
@@ -348,7 +348,7 @@ class Results:
         file = decode(data, path, self._anew)
         wanted = cell_definition(self._definition, cell)
         if file.attrs.get("fingerprint") != fingerprint(wanted):
-            raise FileProblem(path, f"is of another simulation ({_told(file, wanted)})", _OTHER)
+            raise FileProblem(path, f"is of another simulation ({_mismatch(file, wanted)})", _OTHER)
         return file
 
     @property
@@ -385,12 +385,12 @@ class Results:
         return summary
 
     def _computed_summary(self) -> pd.DataFrame:
-        tables, practised = [], []
+        tables, histories = [], []
         for cell in self.experiment.cells():
             strides = self.strides(cell)
             tables.append(summarize(strides))
-            practised.append(practice(strides))
-        tables.append(pd.DataFrame(rows_of_beating(practised), columns=COLUMNS))
+            histories.append(peak_history(strides))
+        tables.append(pd.DataFrame(beat_rows(histories), columns=COLUMNS))
         full = [table for table in tables if len(table)]
         return pd.concat(full).sort_values(KEYS, ignore_index=True)[COLUMNS]
 
@@ -448,7 +448,7 @@ def _strides_name(cell: Cell) -> str:
     return f"strides/{cell.name}.nc"
 
 
-def _told(file: xr.Dataset, wanted: Definition) -> str:
+def _mismatch(file: xr.Dataset, wanted: Definition) -> str:
     """What a file of strides is of, as far as that is not what is wanted."""
     text = file.attrs.get("definition")
     if not isinstance(text, str):

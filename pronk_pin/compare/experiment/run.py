@@ -26,13 +26,13 @@ from ...control import load_controller
 from ...errors import FileProblem, WorkerLost
 from ..simulation import Progress
 from .demand import check_demand
-from .executors import Crew, connect, known_address, processes
-from .experiment import PRACTISED, Cell, Experiment, run_cell
+from .executors import WorkerPool, connect, known_address, processes
+from .experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
 from .provenance import describe_run
 from .results import Results
 from .strides_file import encode
 
-LIVES = 3
+MAX_RETRIES = 3
 """So often the workers may be lost before the run gives up."""
 
 _one_at_a_time = threading.Lock()
@@ -123,7 +123,7 @@ def _complete(
         if executor is None and (workers == 1 or len(cells) <= 1):
             run.here(cells)
         else:
-            run.elsewhere(cells, _crew(executor, min(workers, len(cells))))
+            run.elsewhere(cells, _worker_pool(executor, min(workers, len(cells))))
     began = time.monotonic()
     results.summarize()
     run.finish(summary=time.monotonic() - began)
@@ -145,20 +145,20 @@ def _missing(results: Results, *, resimulate: bool) -> list[Cell]:
     return missing
 
 
-def _crew(
+def _worker_pool(
     executor: Executor | str | None, workers: int
-) -> Callable[[], AbstractContextManager[Crew]]:
+) -> Callable[[], AbstractContextManager[WorkerPool]]:
     """What opens the executor, anew after its workers were lost."""
     if executor is None:
         return lambda: processes(workers)
     if isinstance(executor, str):
         address = executor
         return lambda: connect(address)
-    given = executor
-    return lambda: nullcontext(Crew(given, type(given).__name__))
+    user_executor = executor
+    return lambda: nullcontext(WorkerPool(user_executor, type(user_executor).__name__))
 
 
-class Made(NamedTuple):
+class FinishedCell(NamedTuple):
     """A finished cell, as a worker hands it back."""
 
     strides: bytes
@@ -187,48 +187,50 @@ class _Run:
         """Run cells one after the other in this process."""
         for cell in cells:
             robots = len(cell.speeds)
-            made = _make(cell, self._practised(cell), lambda n, m=robots: self.bar.update(n * m))  # type: ignore[misc]
-            self._save(cell, made)
+            done = _make(cell, self._needed(cell), lambda n, m=robots: self.bar.update(n * m))  # type: ignore[misc]
+            self._save(cell, done)
 
     def elsewhere(
-        self, cells: list[Cell], open_crew: Callable[[], AbstractContextManager[Crew]]
+        self, cells: list[Cell], open_pool: Callable[[], AbstractContextManager[WorkerPool]]
     ) -> None:
         """Run cells in an executor; workers that are lost are replaced, and their cells repeated.
 
         Raises:
             WorkerLost: They were lost again and again.
         """
-        for _ in range(LIVES):
-            with open_crew() as crew:
-                self._record["executor"] = crew.name
+        for _ in range(MAX_RETRIES):
+            with open_pool() as pool:
+                self._record["executor"] = pool.name
                 try:
-                    return self._play(crew, [c for c in cells if c in self.missing])
-                except crew.lost as error:
+                    return self._play(pool, [c for c in cells if c in self.missing])
+                except pool.lost as error:
                     reason = error
         raise WorkerLost(self.results.folder) from reason
 
-    def _play(self, crew: Crew, waiting: list[Cell]) -> None:
+    def _play(self, pool: WorkerPool, waiting: list[Cell]) -> None:
         """Hand cells out and save what comes back; one waits for what it depends on."""
-        total, left = int(self.bar.total or 0), sum(map(_robot_steps, waiting))
-        running: dict[Future[Made], Cell] = {}
+        total, steps_left = int(self.bar.total or 0), sum(map(_robot_steps, waiting))
+        running: dict[Future[FinishedCell], Cell] = {}
         try:
             while waiting or running:
                 for cell in waiting.copy():
-                    if cell.practised is None or cell.practised not in self.missing:
+                    if cell.depends_on is None or cell.depends_on not in self.missing:
                         waiting.remove(cell)
-                        running[crew.executor.submit(_work, cell, self._practised(cell))] = cell
+                        running[pool.executor.submit(_work, cell, self._needed(cell))] = cell
                 for future in wait(running, timeout=0.2, return_when=FIRST_COMPLETED)[0]:
                     self._save(running[future], future.result())
                     del running[future]
                 unfinished = [*waiting, *running.values()]
-                steps = crew.steps() if crew.steps else left - sum(map(_robot_steps, unfinished))
-                self.bar.update(total - left + steps - self.bar.n)
+                steps = (
+                    pool.steps() if pool.steps else steps_left - sum(map(_robot_steps, unfinished))
+                )
+                self.bar.update(total - steps_left + steps - self.bar.n)
         except BaseException:
             self._give_up(running)
-            crew.stop()
+            pool.stop()
             raise
 
-    def _give_up(self, running: dict[Future[Made], Cell]) -> None:
+    def _give_up(self, running: dict[Future[FinishedCell], Cell]) -> None:
         """Call off what has not begun, and save what was finished meanwhile."""
         for future in running:
             future.cancel()
@@ -237,19 +239,19 @@ class _Run:
                 if future.done() and not future.cancelled() and not future.exception():
                     self._save(cell, future.result())
 
-    def _practised(self, cell: Cell) -> xr.Dataset | None:
-        if cell.practised is None:
+    def _needed(self, cell: Cell) -> xr.Dataset | None:
+        if cell.depends_on is None:
             return None
         # Identification reads every tick; a library is made of a few variables.
         explains = load_controller(cell.controller).source == "identified"
-        return self.results.strides(cell.practised, None if explains else PRACTISED)
+        return self.results.strides(cell.depends_on, None if explains else LIBRARY_VARIABLES)
 
-    def _save(self, cell: Cell, made: Made) -> None:
-        self.results.save(cell, made.strides)
+    def _save(self, cell: Cell, finished: FinishedCell) -> None:
+        self.results.save(cell, finished.strides)
         self.missing.discard(cell)
         self._record["cells"][cell.name] = {
-            "simulation_s": round(made.simulation, 2),
-            "encoding_s": round(made.encoding, 2),
+            "simulation_s": round(finished.simulation, 2),
+            "encoding_s": round(finished.encoding, 2),
         }
         self._write()
 
@@ -268,17 +270,17 @@ def _robot_steps(cell: Cell) -> int:
     return cell.steps * len(cell.speeds)
 
 
-def _make(cell: Cell, practised: xr.Dataset | None, progress: Progress) -> Made:
+def _make(cell: Cell, dependency: xr.Dataset | None, progress: Progress) -> FinishedCell:
     # BLAS with several threads may add in another order, and workers side by side need no more.
     with _one_at_a_time, threadpool_limits(1):
         times = [time.perf_counter()]
-        strides = run_cell(cell, practised, progress)
+        strides = run_cell(cell, dependency, progress)
         times.append(time.perf_counter())
         data = encode(strides)
         times.append(time.perf_counter())
-    return Made(data, times[1] - times[0], times[2] - times[1])
+    return FinishedCell(data, times[1] - times[0], times[2] - times[1])
 
 
-def _work(cell: Cell, practised: xr.Dataset | None) -> Made:
+def _work(cell: Cell, dependency: xr.Dataset | None) -> FinishedCell:
     """What a worker does."""
-    return _make(cell, practised, lambda steps: count_steps(steps * len(cell.speeds)))
+    return _make(cell, dependency, lambda steps: count_steps(steps * len(cell.speeds)))

@@ -25,9 +25,9 @@ SUITES: Mapping[str, Mapping[str, Any]] = {
     "paper": {"controllers": ("pd", "ilc", "ilc-paper"), "seeds": tuple(range(5))},
 }
 """Changes of each suite to `Experiment()`: the paper's speeds under five controllers; the same in
-every world of the list of mismatches; practice against the model in 20 sampled worlds, at four
-speeds only, as the worlds are the sample; the control arm, which must show nothing; Table I with
-intervals over seeds, and with the paper's own learning law."""
+every scenario of the list of mismatches; learning against the model in 20 sampled scenarios, at
+four speeds only, as the worlds are the sample; the control arm, which must show nothing; Table I
+with intervals over seeds, and with the paper's own learning law."""
 
 
 def load_suite(name: str) -> Experiment:

@@ -5,8 +5,8 @@ Goes out: an `Explanation`: parameters with intervals, shares by cause, an ident
 """
 
 from .explanation import DRAWS, IMU_NOISE, Explanation, check_learner, explain
-from .findings import describe, foreign, words
-from .identified_gaits import mended_gaits
+from .findings import describe, foreign, remarks
+from .identified_gaits import identified_gaits
 from .model_terms import TERMS, Motion, Term
 from .shares import discrepancy, explained, share_table
 
@@ -23,7 +23,7 @@ __all__ = [
     "explain",
     "explained",
     "foreign",
-    "mended_gaits",
+    "identified_gaits",
+    "remarks",
     "share_table",
-    "words",
 ]

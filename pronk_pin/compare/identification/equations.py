@@ -7,9 +7,9 @@ that the contact forces can be eliminated leg by leg,
     r_base - sum_legs J_base^T J_leg^-T r_leg = 0,
 
 where r are the forces that the motors give beyond what the motion needs, and J the contact Jacobian
-at the spheres' lowest points. Of these rows of the trunk those count that the guide leaves free:
-with a locked base the balances of forces along x and z. They hold whatever the feet do, as long as
-they are pushed where they touch.
+at the spheres' lowest points. Of these rows of the trunk those count that the planar constraint
+leaves free: with a locked base the balances of forces along x and z. They hold whatever the feet
+do, as long as they are pushed where they touch.
 
 Both sides are seen through the same window. That is exact, because the equations are linear in the
 unknowns at every tick; to smooth the motion first would not be.
@@ -44,7 +44,7 @@ GROUPS = ("x", "z", "hip", "thigh", "calf")
 """Kinds of rows: balance of forces along x and z in stance [N], joints in flight [N m]."""
 _JOINTS = 2
 """Index of the first joint among the groups."""
-_GUIDED = (0, 2)
+_PLANAR_ROWS = (0, 2)
 """Rows of the trunk that a locked base leaves free: x and z."""
 
 
@@ -85,12 +85,12 @@ def phase_forces(robot: Robot, phase: PhaseRecording, terms: tuple[Term, ...]) -
         terms: What the model may lack.
     """
     motion = phase.motion(robot)
-    known, columns = forces(robot, motion, terms)
+    residual, columns = forces(robot, motion, terms)
     balance = None
     if phase.part == "stance":
         balance = phase.of_ticks(ground_free(robot, motion.q))
     lean = phase.of_ticks(_weight(robot, motion.q, phase.lean)).mean(axis=0)
-    return PhaseForces(phase, phase.of_ticks(known), phase.of_ticks(columns), lean, balance)
+    return PhaseForces(phase, phase.of_ticks(residual), phase.of_ticks(columns), lean, balance)
 
 
 def equations(robot: Robot, phases: tuple[PhaseForces, ...]) -> Equations:
@@ -126,25 +126,25 @@ def _rows(robot: Robot, forces_: PhaseForces) -> Equations:
 def forces(robot: Robot, motion: Motion, terms: tuple[Term, ...]) -> tuple[Array, Array]:
     """Residual `S tau - rnea(q, v, a)` of the URDF (n, 18), and the terms' columns
     (n, 18, terms)."""
-    known = np.zeros_like(motion.v)
-    known[:, NB:] = motion.tau
+    residual = np.zeros_like(motion.v)
+    residual[:, NB:] = motion.tau
     model, data = robot.model, robot.data
-    for out, q, v, a in zip(known, motion.q, motion.v, motion.a, strict=True):
+    for out, q, v, a in zip(residual, motion.q, motion.v, motion.a, strict=True):
         out -= pin.rnea(model, data, q, v, a)
-    return known, np.stack([term.column(robot, motion) for term in terms], axis=-1)
+    return residual, np.stack([term.column(robot, motion) for term in terms], axis=-1)
 
 
 def _weight(robot: Robot, q: Array, lean: Array) -> Array:
     """Generalised force `M [:, (x, z)] a` of an acceleration of x and z, shape (n, 18)."""
     if not lean.any():
         return np.zeros((len(q), robot.nv))
-    return np.array([mass_matrix(robot, each)[:, list(_GUIDED)] @ lean for each in q])
+    return np.array([mass_matrix(robot, each)[:, list(_PLANAR_ROWS)] @ lean for each in q])
 
 
 def ground_free(robot: Robot, q: Array) -> Array:
     """Combinations of the equations that forces on all feet do not enter: the balances of the
     trunk's forces along x and z, shape (n, 2, 18)."""
-    legs, rows = range(len(robot.legs)), list(_GUIDED)
+    legs, rows = range(len(robot.legs)), list(_PLANAR_ROWS)
     jacobians = np.array([jacobian_at(robot, each, legs, robot.foot_radius) for each in q])
     balance = np.zeros((len(q), len(rows), robot.nv))
     balance[:, np.arange(len(rows)), rows] = 1.0

@@ -90,22 +90,24 @@ def estimate(
             that do not repeat: biased by noise.
     """
     scale = np.array([term.scale for term in terms])
-    weights = {speed: _flight_first(mine) for speed, mine in rows.items()}
+    weights = {speed: _flight_first(equations) for speed, equations in rows.items()}
     sigma = np.ones(len(GROUPS))
     value = np.zeros(len(terms))
     normal: dict[float, Normal] = {}
     for _ in range(_ROUNDS):
         normal = {
-            speed: _normal(mine, weights[speed] / sigma[mine.group] ** 2, scale)
-            for speed, mine in rows.items()
+            speed: _normal(equations, weights[speed] / sigma[equations.group] ** 2, scale)
+            for speed, equations in rows.items()
         }
         value = _solve(*_sum(normal, others), terms)
         residual = {
-            speed: mine.y.mean(axis=0) - mine.A.mean(axis=0) @ value for speed, mine in rows.items()
+            speed: equations.y.mean(axis=0) - equations.A.mean(axis=0) @ value
+            for speed, equations in rows.items()
         }
         sigma = _spread(rows, residual)
         weights = {
-            speed: _tukey(residual[speed] / sigma[mine.group]) for speed, mine in rows.items()
+            speed: _tukey(residual[speed] / sigma[equations.group])
+            for speed, equations in rows.items()
         }
     information, _ = total = _sum(normal, others)
     free = _unbounded(*total) * scale
@@ -115,19 +117,19 @@ def estimate(
 
 def _fit(rows: Mapping[float, Equations], value: Array) -> tuple[Array, Array, Array]:
     """Root mean squares by group: the rest, its expected noise, and the rows' left-hand side."""
-    group = np.concatenate([mine.group for mine in rows.values()])
+    group = np.concatenate([equations.group for equations in rows.values()])
     squares = []
-    for mine in rows.values():
-        rest = mine.y - mine.A @ value  # (k, m)
-        scatter = rest.var(axis=0, ddof=1) / len(rest)
-        squares.append([rest.mean(axis=0) ** 2, scatter, mine.y.mean(axis=0) ** 2])
+    for equations in rows.values():
+        residual = equations.y - equations.A @ value  # (k, m)
+        scatter = residual.var(axis=0, ddof=1) / len(residual)
+        squares.append([residual.mean(axis=0) ** 2, scatter, equations.y.mean(axis=0) ** 2])
     joined = np.concatenate([np.array(each) for each in squares], axis=1)  # (3, rows)
-    found = [
+    rms = [
         np.sqrt(joined[:, group == k].mean(axis=1)) if np.any(group == k) else np.full(3, np.nan)
         for k in range(len(GROUPS))
     ]
-    rest, noise, size = np.array(found).T
-    return rest, noise, size
+    residual, noise, size = np.array(rms).T
+    return residual, noise, size
 
 
 def _flight_first(rows: Equations) -> Array:
@@ -139,7 +141,7 @@ def _flight_first(rows: Equations) -> Array:
 def _spread(rows: Mapping[float, Equations], residual: Mapping[float, Array]) -> Array:
     """Robust standard deviation of each group's residuals."""
     sigma = _FLOOR.copy()
-    group = np.concatenate([mine.group for mine in rows.values()])
+    group = np.concatenate([equations.group for equations in rows.values()])
     all_of_them = np.concatenate(list(residual.values()))
     for k in range(len(GROUPS)):
         if np.any(group == k):
@@ -189,8 +191,8 @@ def _drawn(
         times = np.bincount(rng.integers(k, size=k), minlength=k).astype(float)
         while np.count_nonzero(times) < 2:  # a pair needs two
             times = np.bincount(rng.integers(k, size=k), minlength=k).astype(float)
-        mine = _pairs(each, times, others)
-        G, b = G + mine[0], b + mine[1]
+        pairs = _pairs(each, times, others)
+        G, b = G + pairs[0], b + pairs[1]
     return G, b
 
 
@@ -214,8 +216,8 @@ def _solve(G: Array, b: Array, terms: tuple[Term, ...]) -> Array:
     upper = np.array([term.upper for term in terms]) / scale
     root, vectors = _root(G)
     target = (vectors.T @ b) / root
-    found = scipy.optimize.lsq_linear(root[:, None] * vectors.T, target, (lower, upper))
-    return np.asarray(found.x * scale)
+    solution = scipy.optimize.lsq_linear(root[:, None] * vectors.T, target, (lower, upper))
+    return np.asarray(solution.x * scale)
 
 
 def repetition(rows: Equations, terms: tuple[Term, ...]) -> float:

@@ -71,7 +71,7 @@ class Explanation:
         return parameters({t.name: float(v) for t, v, sees in values if sees}, self.robot)
 
     @cached_property
-    def mended(self) -> Robot:
+    def identified(self) -> Robot:
         """The robot with the identified parameters."""
         return self.robot.with_parameters(self.parameters)
 
@@ -139,20 +139,20 @@ def explain(
         speed: tuple(phase_forces(robot, phase, terms) for phase in phases)
         for speed, phases in recorded.items()
     }
-    rows = {speed: equations(robot, mine) for speed, mine in forces.items()}
+    rows = {speed: equations(robot, phases_) for speed, phases_ in forces.items()}
     used, repeated = _repeating(rows, terms)
-    found = estimate({v: rows[v] for v in used}, terms, rng=rng, draws=draws, others=repeated)
+    fit = estimate({v: rows[v] for v in used}, terms, rng=rng, draws=draws, others=repeated)
     played = _gaits(strides, gaits)
     return Explanation(
         robot=robot,
         terms=terms,
-        estimate=found,
-        confounding=confounding(found),
+        estimate=fit,
+        confounding=confounding(fit),
         shares=shares(
             robot,
             [played[speed] for speed in used],
             [_by_part(forces[speed]) for speed in used],
-            found.value,
+            fit.value,
             terms,
         ),
         ground=survey(robot, _stances(recorded[speed] for speed in used)),
@@ -183,7 +183,9 @@ def _repeating(
     rows: Mapping[float, Equations], terms: tuple[Term, ...]
 ) -> tuple[list[float], bool]:
     """Speeds whose strides repeat, or all of them where none do; whether they do."""
-    repeating = [speed for speed, mine in rows.items() if repetition(mine, terms) > REPEATS]
+    repeating = [
+        speed for speed, equations in rows.items() if repetition(equations, terms) > REPEATS
+    ]
     return (repeating, True) if repeating else (list(rows), False)
 
 

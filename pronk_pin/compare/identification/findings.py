@@ -38,7 +38,7 @@ def describe(explanation: Explanation) -> str:
         [
             format_parameters(explanation),
             format_shares(explanation),
-            "\n".join(textwrap.fill(word, _WIDTH) for word in words(explanation)),
+            "\n".join(textwrap.fill(word, _WIDTH) for word in remarks(explanation)),
         ]
     )
 
@@ -46,10 +46,10 @@ def describe(explanation: Explanation) -> str:
 def format_parameters(explanation: Explanation) -> str:
     """Format the parameters with their intervals, and their true values where known."""
     table = explanation.table()
-    known = bool(table["true"].notna().any())
+    has_truth = bool(table["true"].notna().any())
     lines = [
         f"{'what the model lacks':<18}{'estimate':>10}  {'95 % interval':^19}"
-        + (f"{'true':>9}" if known else "")
+        + (f"{'true':>9}" if has_truth else "")
         + "  unit"
     ]
     for term, (name, row) in zip(explanation.terms, table.iterrows(), strict=True):
@@ -59,7 +59,7 @@ def format_parameters(explanation: Explanation) -> str:
             cells = f"{row['estimate']:10.{digits}f}  [{low},{high}]"
         else:
             cells = f"{'-':>10}  {'not seen':^19}"
-        truth = f"{row['true']:9.{digits}f}" if known else ""
+        truth = f"{row['true']:9.{digits}f}" if has_truth else ""
         lines.append(f"{name:<18}{cells}{truth}  {row['unit']}")
     return "\n".join(lines)
 
@@ -67,10 +67,10 @@ def format_parameters(explanation: Explanation) -> str:
 def format_shares(explanation: Explanation) -> str:
     """Format the shares of the causes in the difference between learned and model torque."""
     table, fit = explanation.share_table, explained(explanation.shares)
-    found = explanation.shares
-    size = discrepancy(found) ** 2
+    shares = explanation.shares
+    size = discrepancy(shares) ** 2
     heads = [(part, joint) for part in ("stance", "flight") for joint in JOINTS]
-    kinds = [str(name).split("_")[1] for name in found["joint"].to_numpy()]
+    kinds = [str(name).split("_")[1] for name in shares["joint"].to_numpy()]
     lines = [
         f"{'learned - model':<18}" + "".join(f"{part:>9}" for part, _ in heads),
         f"{'explained by':<18}" + "".join(f"{joint:>9}" for _, joint in heads),
@@ -83,7 +83,7 @@ def format_shares(explanation: Explanation) -> str:
     for cause in map(str, table["cause"].to_numpy()):
         values = [float(table.sel(cause=cause, part=p, joint=j)) for p, j in heads]
         lines.append(f"{cause:<18}" + "".join(_number(value, ".0%") for value in values))
-    share = feedback_share(found)
+    share = feedback_share(shares)
     values = [float(share.sel(part=p, joint=j)) for p, j in heads]
     lines.append(f"{'(from feedback)':<18}" + "".join(_number(value, ".0%") for value in values))
     values = [float(fit.sel(part=p, joint=j)) for p, j in heads]
@@ -91,7 +91,7 @@ def format_shares(explanation: Explanation) -> str:
     return "\n".join(lines)
 
 
-def words(explanation: Explanation) -> list[str]:
+def remarks(explanation: Explanation) -> list[str]:
     """Remarks on the data, the residual, internal forces, the ground and confounding."""
     return [
         *_of_the_strides(explanation),
@@ -116,24 +116,24 @@ def _of_the_strides(explanation: Explanation) -> Iterator[str]:
     if strides < FEW_STRIDES:
         yield (
             f"Only {strides} strides: the intervals are rough, and may be too narrow. Let it "
-            "practise longer."
+            "learn longer."
         )
     if speeds == 1:
         yield (
-            "One speed only: terms that one motion does not tell apart stay together. Practise at "
+            "One speed only: terms that one motion does not tell apart stay together. Learn at "
             "two or more."
         )
 
 
 def _of_the_rest(explanation: Explanation) -> Iterator[str]:
-    found = foreign(explanation)
-    if found:
-        rest = ", ".join(
+    residuals = foreign(explanation)
+    if residuals:
+        listed = ", ".join(
             f"{value:.2g} {_UNITS.get(group, 'N m')} in {_place(group)}"
-            for group, value in found.items()
+            for group, value in residuals.items()
         )
         yield (
-            f"Unexplained: something that is none of the terms is at work, {rest} (root mean "
+            f"Unexplained: something that is none of the terms is at work, {listed} (root mean "
             "square). The estimates are of the rest, and less sure than they look."
         )
 
@@ -155,15 +155,15 @@ def _of_internal_forces(explanation: Explanation) -> Iterator[str]:
     torque = explanation.shares["torque"].sel(cause="internal forces", part="stance")
     kinds = [str(name).split("_")[1] for name in torque["joint"].to_numpy()]
     for joint in dict.fromkeys(kinds):
-        mine = torque.isel(joint=[kind == joint for kind in kinds])
-        size = float(np.sqrt((mine**2).mean()))
+        torque_of_kind = torque.isel(joint=[kind == joint for kind in kinds])
+        size = float(np.sqrt((torque_of_kind**2).mean()))
         share = float(
             explanation.share_table.sel(cause="internal forces", part="stance").sel(joint=joint)
         )
         if share > 0.5 and size > _INTERNAL:
             yield (
                 f"In stance the {joint}s learned {size:.1f} N m (root mean square) that make no "
-                "motion: the feet push against each other and the guide."
+                "motion: the feet push against each other and the planar constraint."
             )
 
 
@@ -189,21 +189,21 @@ def _of_the_ground(explanation: Explanation) -> Iterator[str]:
 
 
 def _of_confounding(explanation: Explanation) -> Iterator[str]:
-    terms, found = explanation.terms, explanation.confounding
-    unseen = [term for term, seen in zip(terms, found.seen, strict=True) if not seen]
+    terms, confounding = explanation.terms, explanation.confounding
+    unseen = [term for term, seen in zip(terms, confounding.seen, strict=True) if not seen]
     for advice in dict.fromkeys(term.advice for term in unseen):
         names = " and ".join(term.name for term in unseen if term.advice == advice)
         yield f"Not seen in this motion: {names}. To see it, {advice}."
     low, high = explanation.estimate.interval()
     wide = 0.5 * (high - low) > WIDE * np.array([term.scale for term in terms])
-    for i, j, correlation in found.pairs:
+    for i, j, correlation in confounding.pairs:
         if wide[i] or wide[j]:
             advice = "; or ".join(dict.fromkeys([terms[i].advice, terms[j].advice]))
             yield (
                 f"Not told apart: {terms[i].name} and {terms[j].name} (correlation "
                 f"{correlation:.2f}); what is sure is their sum. To tell, {advice}."
             )
-    yield f"Condition number of what was seen: {found.condition:.0f}."
+    yield f"Condition number of what was seen: {confounding.condition:.0f}."
 
 
 def _number(value: float, form: str) -> str:

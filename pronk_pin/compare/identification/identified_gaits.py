@@ -9,7 +9,7 @@ from ...gait import Gait, GaitSolution, gait_problem, optimize_gait
 from ...robot import Robot
 
 
-def mended_gaits(robot: Robot, gaits: Sequence[Gait]) -> list[Gait]:
+def identified_gaits(robot: Robot, gaits: Sequence[Gait]) -> list[Gait]:
     """Optimise gaits of the same speeds and heights again, for a robot with its parameters.
 
     With rotors the legs bring other momentum to the ground and land otherwise: what was a gait of

@@ -206,7 +206,7 @@ def parameters(values: Mapping[str, float], robot: Robot) -> ModelParameters:
 
 
 def truth(scenario: Scenario) -> dict[str, float]:
-    """The terms' true parameters in a simulated world, as far as it names them."""
+    """The terms' true parameters in a simulated scenario, as far as it names them."""
     by_joint = {
         f"{joint} {name}": getattr(scenario, field)
         for joint in JOINTS

@@ -123,18 +123,18 @@ def recordings(
             "this result has no ticks, which explain reads; run 'pronk-pin compare' again"
         )
     timestep, lean = float(strides.attrs["timestep"]), _lean(strides)
-    found: dict[float, tuple[PhaseRecording, ...]] = {}
+    by_speed: dict[float, tuple[PhaseRecording, ...]] = {}
     for k, speed in enumerate(strides["speed"].to_numpy()):
-        mine = strides.isel(speed=k)
-        first = mine["tick_joint_rates"].sel(part=list(parts)).isel(joint=0)
+        of_speed = strides.isel(speed=k)
+        first = of_speed["tick_joint_rates"].sel(part=list(parts)).isel(joint=0)
         ticks = np.isfinite(first.transpose("last", "part", "tick").to_numpy()).sum(axis=-1)
         usual = np.median(ticks, axis=0)  # (parts,)
         whole = np.flatnonzero((ticks > _SHORTEST * usual).all(axis=1) & (usual > 1.0).all())
         if len(whole) < FEWEST:
             continue
-        found[float(speed)] = tuple(
+        by_speed[float(speed)] = tuple(
             _recording(
-                mine.isel(last=whole).sel(part=part),
+                of_speed.isel(last=whole).sel(part=part),
                 part,
                 int(ticks[whole, column].min()),
                 timestep,
@@ -144,13 +144,13 @@ def recordings(
             )
             for column, part in enumerate(parts)
         )
-    if not found:
+    if not by_speed:
         raise InvalidInput(f"no speed has {FEWEST} whole strides at its end; explain a longer run")
-    return found
+    return by_speed
 
 
 def _lean(strides: xr.Dataset) -> Array:
-    """Model's gravity less the simulated world's, along x and z [m/s^2], shape (2,)."""
+    """Model's gravity less the simulated scenario's, along x and z [m/s^2], shape (2,)."""
     model = load_robot(strides.attrs["robot"]).model.gravity.linear
     try:
         world = Scenario.from_json(strides.attrs["scenario_parameters"]).gravity_vector
@@ -160,7 +160,7 @@ def _lean(strides: xr.Dataset) -> Array:
 
 
 def _recording(
-    mine: xr.Dataset,
+    strides: xr.Dataset,
     part: str,
     ticks: int,
     timestep: float,
@@ -169,7 +169,7 @@ def _recording(
     rng: np.random.Generator | None,
 ) -> PhaseRecording:
     def values(name: str, last: str) -> Array:
-        array = mine[f"tick_{name}"].transpose("last", "tick", last).to_numpy()
+        array = strides[f"tick_{name}"].transpose("last", "tick", last).to_numpy()
         return np.asarray(array[:, :ticks], dtype=float)
 
     base_rate = values("base_rate", "axis")

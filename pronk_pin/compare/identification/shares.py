@@ -8,9 +8,10 @@ Learned is what the motors were told in the end: feedforward, and what is still 
 Gravity is what it takes on a slope along which the trunk is held, or where it is not the model's.
 Deviation is what the URDF's robot would need for the measured motion instead of the reference.
 In stance four feet leave ten of the twelve torques to themselves, in that they push the feet
-against each other and the guide: these internal forces make no motion, and no motion tells why they
-are there. What does make motion is in the two other directions, with the least torques: there the
-terms, gravity, the deviation and the rest are told apart. In flight nothing is internal.
+against each other and the planar constraint: these internal forces make no motion, and no motion
+tells why they are there. What does make motion is in the two other directions, with the least
+torques: there the terms, gravity, the deviation and the rest are told apart. In flight nothing is
+internal.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import xarray as xr
 from ..._typing import Array
 from ...control import phase_grid
 from ...gait import Gait
-from ...inverse_dynamics import SAGITTAL_GUIDE, feedforward
+from ...inverse_dynamics import PLANAR_CONSTRAINT, feedforward
 from ...robot import NB, Robot
 from .equations import PhaseForces, settled_ticks, windowed
 from .model_terms import Term
@@ -66,17 +67,17 @@ def shares(
     torque = np.full((len(causes), *shape), np.nan)
     for k, (gait, by_part) in enumerate(zip(gaits, phases, strict=True)):
         reference = feedforward(
-            robot, gait, contact="rolling", friction=FRICTION, guide=SAGITTAL_GUIDE
+            robot, gait, contact="rolling", friction=FRICTION, constraint=PLANAR_CONSTRAINT
         )
-        for part, mine in by_part.items():
+        for part, phase in by_part.items():
             at = (k, PARTS.index(part))
             planned = gait.phase(part).duration
-            on_ticks = _model_on_ticks(mine, getattr(reference, part), planned)
-            parts = _apart(mine, on_ticks, value, terms, causes)
-            learned[at], model[at], spread[at], feedback[at], *rest = (
-                _on_grid(mine, values, planned) for values in parts
+            on_ticks = _model_on_ticks(phase, getattr(reference, part), planned)
+            parts = _apart(phase, on_ticks, value, terms, causes)
+            learned[at], model[at], spread[at], feedback[at], *causes_on_grid = (
+                _on_grid(phase, values, planned) for values in parts
             )
-            torque[(slice(None), *at)] = rest
+            torque[(slice(None), *at)] = causes_on_grid
     dims = ("speed", "part", "phase", "joint")
     names = [name.removesuffix("_joint") for name in robot.joint_names]
     return xr.Dataset(
@@ -118,27 +119,27 @@ def _apart(
 ) -> list[Array]:
     """Learned, model, spread, feedback, and each cause's torque, at the ticks (ticks, 12)."""
     recording = phase.recording
-    told = recording.torque[:, :-1].mean(axis=0)
+    commanded = recording.torque[:, :-1].mean(axis=0)
     ahead = recording.feedforward[:, :-1].mean(axis=0)
-    known, columns = phase.known.mean(axis=0), phase.columns.mean(axis=0) * value
-    needed = -known
-    needed[:, NB:] += told  # rnea of the URDF
+    residual, columns = phase.known.mean(axis=0), phase.columns.mean(axis=0) * value
+    needed = -residual
+    needed[:, NB:] += commanded  # rnea of the URDF
     columns = np.moveaxis(columns, -1, 0)  # (terms, ticks, 18)
     lean = phase.lean
     if phase.balance is None:
-        moving, internal = told, np.zeros_like(told)
+        moving, internal = commanded, np.zeros_like(commanded)
         needed, columns, lean = needed[:, NB:], columns[..., NB:], lean[:, NB:]
     else:
         balance = phase.balance.mean(axis=0)  # (ticks, 2, 18)
         least = np.linalg.pinv(balance[:, :, NB:])  # (ticks, 12, 2)
-        motors = np.einsum("tij,tj->ti", balance[:, :, NB:], told)
+        motors = np.einsum("tij,tj->ti", balance[:, :, NB:], commanded)
         moving = np.einsum("tij,tj->ti", least, motors)
-        internal = told - moving
+        internal = commanded - moving
         needed, columns, lean = (
             np.einsum("tij,tjk,...tk->...ti", least, balance, each, optimize=True)
             for each in (needed, columns, lean)
         )
-    by_cause = dict.fromkeys(causes, np.zeros_like(told))
+    by_cause = dict.fromkeys(causes, np.zeros_like(commanded))
     for term, column in zip(terms, columns, strict=True):
         by_cause[term.cause] = by_cause[term.cause] + column
     by_cause["gravity"] = lean
@@ -146,7 +147,7 @@ def _apart(
     by_cause["internal forces"] = internal
     by_cause["unexplained"] = moving - needed - columns.sum(axis=0)
     spread = recording.torque[:, :-1].std(axis=0)
-    return [told, model, spread, told - ahead, *by_cause.values()]
+    return [commanded, model, spread, commanded - ahead, *by_cause.values()]
 
 
 def _on_grid(phase: PhaseForces, values: Array, planned: float) -> Array:
@@ -160,40 +161,40 @@ def _on_grid(phase: PhaseForces, values: Array, planned: float) -> Array:
     return np.asarray(on_grid)
 
 
-def share_table(found: xr.Dataset) -> xr.DataArray:
+def share_table(shares: xr.Dataset) -> xr.DataArray:
     """Share `<tau_cause, d> / <d, d>` of the discrepancy d by cause, part and kind of joint.
 
     Sums are over speeds, legs and phases outside the bounce. Shares sum to 1 over the causes; they
     are negative where a cause works against the discrepancy.
     """
-    return _projected(found, found["torque"])
+    return _projected(shares, shares["torque"])
 
 
-def feedback_share(found: xr.Dataset) -> xr.DataArray:
+def feedback_share(shares: xr.Dataset) -> xr.DataArray:
     """Share of the discrepancy that feedback still gave, by part and kind of joint."""
-    return _projected(found, found["feedback"])
+    return _projected(shares, shares["feedback"])
 
 
-def discrepancy(found: xr.Dataset) -> xr.DataArray:
+def discrepancy(shares: xr.Dataset) -> xr.DataArray:
     """Learned less model torque [N m]; NaN in the bounce after touchdown."""
-    return _settled(found, found["learned"] - found["model"])
+    return _settled(shares, shares["learned"] - shares["model"])
 
 
-def _projected(found: xr.Dataset, torque: xr.DataArray) -> xr.DataArray:
-    size, over = discrepancy(found), ("speed", "phase")
-    return _by_kind(_settled(found, torque) * size).sum(over) / _by_kind(size**2).sum(over)
+def _projected(shares: xr.Dataset, torque: xr.DataArray) -> xr.DataArray:
+    size, over = discrepancy(shares), ("speed", "phase")
+    return _by_kind(_settled(shares, torque) * size).sum(over) / _by_kind(size**2).sum(over)
 
 
-def explained(found: xr.Dataset) -> xr.DataArray:
+def explained(shares: xr.Dataset) -> xr.DataArray:
     """R^2 = 1 - |unexplained|^2 / |discrepancy|^2 by part and kind of joint, outside the bounce
     after touchdown."""
-    rest, over = _settled(found, found["torque"].sel(cause="unexplained")), ("speed", "phase")
-    return 1.0 - _by_kind(rest**2).sum(over) / _by_kind(discrepancy(found) ** 2).sum(over)
+    residual, over = _settled(shares, shares["torque"].sel(cause="unexplained")), ("speed", "phase")
+    return 1.0 - _by_kind(residual**2).sum(over) / _by_kind(discrepancy(shares) ** 2).sum(over)
 
 
-def _settled(found: xr.Dataset, values: xr.DataArray) -> xr.DataArray:
-    time = found["phase"] * found["duration"]
-    return values.where((found["part"] != "stance") | (time > BOUNCE))
+def _settled(shares: xr.Dataset, values: xr.DataArray) -> xr.DataArray:
+    time = shares["phase"] * shares["duration"]
+    return values.where((shares["part"] != "stance") | (time > BOUNCE))
 
 
 def _by_kind(values: xr.DataArray) -> xr.DataArray:

@@ -29,7 +29,7 @@ def effort(strides: xr.Dataset) -> dict[str, tuple[Array, str]]:
     if not set(TICKS) <= set(strides.data_vars):
         return {}
     robot, dt = load_robot(strides.attrs["robot"]), float(strides.attrs["timestep"])
-    found = np.full((2, strides.sizes["speed"]), np.nan)
+    values = np.full((2, strides.sizes["speed"]), np.nan)
     for k in range(strides.sizes["speed"]):
         base, base_rate, joints, rates, torque = (_sequence(strides[name][k]) for name in TICKS)
         whole = np.isfinite(np.hstack([base, base_rate, joints, rates, torque])).all(axis=1)
@@ -42,8 +42,8 @@ def effort(strides: xr.Dataset) -> dict[str, tuple[Array, str]]:
         v = _rates(robot, base_rate, rates)
         spent = np.maximum(mechanical_power(robot, v, torque), 0.0).sum(axis=1)
         cost = cost_of_transport(robot, t, _states(robot, base, joints), v, torque)
-        found[:, k] = trapezoid(spent, t) / (t[-1] - t[0]), cost if np.isfinite(cost) else np.nan
-    return {"power": (found[0], "W"), "cost_of_transport": (found[1], "1")}
+        values[:, k] = trapezoid(spent, t) / (t[-1] - t[0]), cost if np.isfinite(cost) else np.nan
+    return {"power": (values[0], "W"), "cost_of_transport": (values[1], "1")}
 
 
 def _sequence(values: xr.DataArray) -> Array:

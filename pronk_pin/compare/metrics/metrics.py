@@ -114,19 +114,24 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
         count = int(strides["count"][k])
         learning = scalars["learning"][k, :count] == 1
         last = min(STEADY_STRIDES, int(switched[k, :count].sum()) or count)
-        end = slice(count - last, max(count, 1))  # without any, one of NaN
+        last_strides = slice(count - last, max(count, 1))  # without any, one of NaN
         planned = {"mean_speed": speed, "apex": float(strides["planned_apex"][k])}
-        found = [
-            *_errors({name: values[k, end] for name, values in per_joint.items()}),
-            *_motion({name: values[k, end] for name, values in scalars.items()}, planned),
-            ("-", "feedback_share", _share(*(torques[name][k, end] for name in torques)), "1"),
+        metrics = [
+            *_errors({name: values[k, last_strides] for name, values in per_joint.items()}),
+            *_motion({name: values[k, last_strides] for name, values in scalars.items()}, planned),
+            (
+                "-",
+                "feedback_share",
+                _share(*(torques[name][k, last_strides] for name in torques)),
+                "1",
+            ),
             *(("-", name, values[k], unit) for name, (values, unit) in spent.items()),
             *_settling(per_joint["peak_error"][k, :count], learning),
             *(_lessons(skipped[k, :count][learning]) if skipped is not None else ()),
         ]
         rows += [
             {**settings, "speed": float(speed), **dict(zip(COLUMNS[-4:], row, strict=True))}
-            for row in found
+            for row in metrics
         ]
     return pd.DataFrame(rows)[COLUMNS].sort_values(KEYS, ignore_index=True)
 

@@ -1,11 +1,11 @@
 """How sure the numbers are: intervals, paired differences, and who beats whom how often.
 
-What is compared are errors of the same robots (same speed, world and seed) under two controllers.
-The unit that is drawn again and again is the sampled world, whose robots share what was drawn, or
-the seed in a world that is not sampled. Where there are fewer than `LEAST_UNITS` of them, the
-speeds are the unit, each the mean over its seeds; the interval then says how the mean would scatter
-over other speeds and starting postures like these, and nothing about other worlds. Every result
-names its unit.
+What is compared are errors of the same robots (same speed, scenario and seed) under two
+controllers. The unit that is drawn again and again is the sampled scenario, whose robots share what
+was drawn, or the seed in a world that is not sampled. Where there are fewer than `LEAST_UNITS` of
+them, the speeds are the unit, each the mean over its seeds; the interval then says how the mean
+would scatter over other speeds and starting postures like these, and nothing about other scenarios.
+Every result names its unit.
 
 A robot that fell has no error worth a number: it counts among the fallen, loses every comparison
 with one that did not fall, and is left out of means and differences. Two that fell say nothing of
@@ -28,7 +28,7 @@ CONFIDENCE = 0.95
 """Level of every interval."""
 
 LEAST_UNITS = 5
-"""Fewest sampled worlds, or seeds, that are drawn from to make an interval."""
+"""Fewest sampled scenarios, or seeds, that are drawn from to make an interval."""
 
 RESAMPLES = 4999
 """Samples that the bootstrap draws."""
@@ -70,7 +70,7 @@ class Comparison(NamedTuple):
     pairs: int
     """Pairs in which neither fell: those of the difference and the reduction."""
     unit: str
-    """What was drawn: "world", "seed" or "speed"."""
+    """What was drawn: "scenario", "seed" or "speed"."""
 
     @property
     def better(self) -> bool | None:
@@ -92,8 +92,8 @@ def sampled(scenario: str) -> bool:
 
 def in_family(summary: pd.DataFrame, scenario: str) -> pd.DataFrame:
     """The rows of a world, or of a family of sampled ones."""
-    worlds = [name for name in summary["scenario"].unique() if family(name) == scenario]
-    return summary[summary["scenario"].isin(worlds)]
+    members = [name for name in summary["scenario"].unique() if family(name) == scenario]
+    return summary[summary["scenario"].isin(members)]
 
 
 def robots(
@@ -104,11 +104,11 @@ def robots(
     metric: str = "peak_error",
     joint: str = "calf",
 ) -> pd.DataFrame:
-    """A metric of each robot: a row a unit (world and seed), a column a speed.
+    """A metric of each robot: a row a unit (scenario and seed), a column a speed.
 
     Args:
         summary: See `compare.metrics`.
-        scenario: A world or a family of sampled ones.
+        scenario: A scenario or a family of sampled ones.
         controller: Whose.
         metric: Which metric.
         joint: Which joint, "-" for a metric of the robot.
@@ -116,11 +116,11 @@ def robots(
     Returns:
         Values, NaN where the robot fell (but for the metric `upright` itself).
     """
-    mine = in_family(summary[summary["controller"] == controller], scenario)
-    values = _pivot(mine[(mine["metric"] == metric) & (mine["joint"] == joint)])
+    rows = in_family(summary[summary["controller"] == controller], scenario)
+    values = _pivot(rows[(rows["metric"] == metric) & (rows["joint"] == joint)])
     if metric == "upright":
         return values
-    upright = _pivot(mine[mine["metric"] == "upright"]).reindex_like(values)
+    upright = _pivot(rows[rows["metric"] == "upright"]).reindex_like(values)
     return values.where(upright != 0.0)
 
 
@@ -148,7 +148,7 @@ def compare_controllers(
 
     Args:
         summary: See `compare.metrics`.
-        scenario: A world or a family of sampled ones.
+        scenario: A scenario or a family of sampled ones.
         controller: The one.
         against: The other, "pd" or "model" as a rule.
         metric: An error, of which less is better.
@@ -204,18 +204,20 @@ def _pivot(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def unit_of(values: pd.DataFrame) -> str:
-    """What is drawn from a table of `robots`: "world", "seed" or "speed"."""
-    worlds = values.index.unique("scenario") if "scenario" in values.index.names else values.index
-    several, units = len(worlds) > 1, len(worlds) if len(worlds) > 1 else len(values)
+    """What is drawn from a table of `robots`: "scenario", "seed" or "speed"."""
+    scenarios = (
+        values.index.unique("scenario") if "scenario" in values.index.names else values.index
+    )
+    several, units = len(scenarios) > 1, len(scenarios) if len(scenarios) > 1 else len(values)
     if units < LEAST_UNITS:
         return "speed"
-    return "world" if several else "seed"
+    return "scenario" if several else "seed"
 
 
 def _by_unit(values: pd.DataFrame) -> tuple[Array, str]:
     """Mean of each unit, and what the unit is; units without any value are left out."""
     unit = unit_of(values)
-    if unit == "world":
+    if unit == "scenario":
         values = values.groupby(level="scenario", sort=False).mean()
     means = values.mean(axis="index" if unit == "speed" else "columns").to_numpy(dtype=float)
     return means[~np.isnan(means)], unit

@@ -17,19 +17,19 @@ RIVAL = "model"
 """The controller that learning has to beat."""
 
 LEARNER = "ilc"
-"""Practice, when it is asked whether it beats the model."""
+"""Learning, when it is asked whether it beats the model."""
 
 JUDGED = ("calf", "thigh")
 """Joints whose error counts."""
 
 VARIABLES = ("count", "start", "peak_error", "learning", "upright")
-"""Variables of the strides that `practice` reads."""
+"""Variables of the strides that `peak_history` reads."""
 
 WINDOW = 5
 """Strides whose mean error is compared, so that one lucky or unlucky stride decides nothing."""
 
 
-class Practice(NamedTuple):
+class PeakHistory(NamedTuple):
     """Peak errors of a simulation, by which it is compared with another."""
 
     settings: Mapping[str, object]
@@ -44,15 +44,15 @@ class Practice(NamedTuple):
     """1 for robots that never fell, NaN for those that finished no stride, shape (n,)."""
 
 
-def practice(strides: xr.Dataset) -> Practice:
-    """Read a simulation's `Practice`."""
+def peak_history(strides: xr.Dataset) -> PeakHistory:
+    """Read a simulation's `PeakHistory`."""
     names = ("robot", "base", "scenario", "controller")
     peaks = by_joint(strides["peak_error"]).sel(joint=list(JUDGED))
     peaks = peaks.transpose("speed", "stride", "joint")
     level = by_joint(steady(strides)["peak_error"]).mean("stride").sel(joint=list(JUDGED))
     count = strides["count"].to_numpy()
     on = strides["learning"].to_numpy() == 1
-    return Practice(
+    return PeakHistory(
         {**{name: strides.attrs[name] for name in names}, "seed": int(strides.attrs["seed"])},
         strides["speed"].to_numpy(),
         tuple(peaks.to_numpy()[k, : count[k]][on[k, : count[k]]] for k in range(len(count))),
@@ -85,27 +85,29 @@ def strides_to_beat(peaks: Array, level: float) -> float:
     return float(first + np.argmax(peaks[first:] < level) + 1)
 
 
-def rows_of_beating(practised: list[Practice]) -> Iterator[dict[str, object]]:
+def beat_rows(histories: list[PeakHistory]) -> Iterator[dict[str, object]]:
     """Rows of the summary: `strides_to_beat_model` of every robot that learned.
 
     For calf and thigh, and `-` for the later of the two; only where the model's feedforward was
-    run in the same world with the same seed.
+    run in the same scenario with the same seed.
     """
-    rivals = {_place(one): one for one in practised if one.settings["controller"] == RIVAL}
-    for one in practised:
-        rival = rivals.get(_place(one))
-        if rival is None or not any(len(peaks) for peaks in one.learning):
+    rivals = {
+        _place(history): history for history in histories if history.settings["controller"] == RIVAL
+    }
+    for history in histories:
+        rival = rivals.get(_place(history))
+        if rival is None or not any(len(peaks) for peaks in history.learning):
             continue
-        for k, speed in enumerate(one.speeds):
+        for k, speed in enumerate(history.speeds):
             counts = [
-                strides_to_beat(one.learning[k][:, j], float(rival.level[k, j]))
+                strides_to_beat(history.learning[k][:, j], float(rival.level[k, j]))
                 for j in range(len(JUDGED))
             ]
-            if one.upright[k] != 1:
+            if history.upright[k] != 1:
                 counts = [float("nan")] * len(JUDGED)  # who fell has beaten nobody
             for joint, value in zip((*JUDGED, "-"), (*counts, np.max(counts)), strict=True):
                 yield {
-                    **one.settings,
+                    **history.settings,
                     "speed": float(speed),
                     "joint": joint,
                     "metric": "strides_to_beat_model",
@@ -142,8 +144,8 @@ def lessons(summary: pd.DataFrame, *, controller: str) -> Lessons | None:
     return Lessons(int(counts["strides_of_learning"]), skipped)
 
 
-def _place(one: Practice) -> tuple[object, ...]:
-    return one.settings["scenario"], one.settings["seed"], *one.speeds
+def _place(history: PeakHistory) -> tuple[object, ...]:
+    return history.settings["scenario"], history.settings["seed"], *history.speeds
 
 
 def beaten(summary: pd.DataFrame, *, controller: str) -> tuple[float, int, int]:
@@ -152,7 +154,7 @@ def beaten(summary: pd.DataFrame, *, controller: str) -> tuple[float, int, int]:
     Returns:
         Median over the robots that did (NaN without one), how many did, and how many there are.
     """
-    mine = (summary["metric"] == "strides_to_beat_model") & (summary["joint"] == "-")
-    counts = summary[mine & (summary["controller"] == controller)]["value"].to_numpy()
+    rows = (summary["metric"] == "strides_to_beat_model") & (summary["joint"] == "-")
+    counts = summary[rows & (summary["controller"] == controller)]["value"].to_numpy()
     did = counts[~np.isnan(counts)]
     return float(np.median(did)) if did.size else float("nan"), int(did.size), int(counts.size)

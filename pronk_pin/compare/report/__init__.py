@@ -6,7 +6,7 @@ Goes out: tables and text for a terminal and for the report.
 
 from .difference import format_changes
 from .limitations import limitations
-from .tables import SHOWN, WORLD, answer, beside_the_paper, sampled_worlds
+from .tables import SHOWN, SHOWN_PARAMETERS, answer, beside_the_paper, sampled_scenarios
 from .text import (
     against_model,
     answer_in_words,
@@ -23,7 +23,7 @@ from .text import (
 
 __all__ = [
     "SHOWN",
-    "WORLD",
+    "SHOWN_PARAMETERS",
     "against_model",
     "answer",
     "answer_in_words",
@@ -37,7 +37,7 @@ __all__ = [
     "format_tables",
     "limitations",
     "number",
-    "sampled_worlds",
+    "sampled_scenarios",
     "units_of_intervals",
     "verdict",
 ]

@@ -22,7 +22,7 @@ _FLIPS = 9999
 
 
 def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
-    """Mean peak errors of two summaries, world by world and controller by controller.
+    """Mean peak errors of two summaries, scenario by scenario and controller by controller.
 
     Robots are matched by world, controller, speed and, if both have the same ones, seed; otherwise
     each speed's mean over its seeds. The p-values are those of the paired permutation test (signs
@@ -31,7 +31,7 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     too, whatever the errors do.
 
     Returns:
-        A row each world, controller and joint: `before`, `after` [rad], `difference` with `_low`
+        A row each scenario, controller and joint: `before`, `after` [rad], `difference` with `_low`
         and `_high`, `p` (adjusted), `robots` compared, `fallen_before`, `fallen_after`, and
         `change`: "better", "worse" or "".
 
@@ -50,7 +50,7 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     ]
     if not rows:
         raise InvalidInput(
-            "the two results have no world and controller in common; give two of "
+            "the two results have no scenario and controller in common; give two of "
             "the same --scenarios and --controllers"
         )
     table = pd.DataFrame(rows)
@@ -74,7 +74,7 @@ def format_changes(first: Results, second: Results) -> str:
     lines.append("")
     if len(named):
         lines += [
-            f"{'world':>14} {'controller':>12} {'joint':>6}  {'before':>7} {'after':>7} "
+            f"{'scenario':>14} {'controller':>12} {'joint':>6}  {'before':>7} {'after':>7} "
             f"{'difference':>10} {'95 % interval':>18}  {'p':>7}  change",
             *(_line(key, row) for key, row in named.iterrows()),
         ]
@@ -101,7 +101,7 @@ def _row(
     mine: dict[str, Any] = {"scenario": world, "controller": controller}
     one, other = (robots(summary, **mine, joint=joint) for summary in (after, before))
     fallen = [int(part.isna().to_numpy().sum()) for part in (one, other)]
-    if not one.index.equals(other.index):  # other seeds or sampled worlds: speed by speed
+    if not one.index.equals(other.index):  # other seeds or sampled scenarios: speed by speed
         one, other = one.mean().to_frame().T, other.mean().to_frame().T
     one, other = one.align(other, join="inner")
     found = compare_pairs(one, other)

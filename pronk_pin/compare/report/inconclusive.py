@@ -1,4 +1,4 @@
-"""Why a result says nothing of practice: who fell, what taught nothing, what was not run."""
+"""Why a result says nothing of learning: who fell, what taught nothing, what was not run."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _NAMES = {"pd": "PD", "model": "the model's feedforward"}
 
 
 def inconclusive(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame, against: str) -> str:
-    """Why nothing is concluded of practice in a world, as a clause; empty where something is.
+    """Why nothing is concluded of learning in a world, as a clause; empty where something is.
 
     Args:
         summary: See `compare.metrics`.
-        scenario: The world, or a family of sampled ones.
+        scenario: The scenario, or a family of sampled ones.
         table: Its `overview`.
-        against: What practice is compared with, "pd" or "model".
+        against: What learning is compared with, "pd" or "model".
     """
     return _untaught(in_family(summary, scenario)) or _unpaired(table, against)
 
@@ -26,7 +26,7 @@ def inconclusive(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame, a
 def unsaid(table: pd.DataFrame) -> str:
     """Why an experiment has no verdict, from the table of `answer`.
 
-    A verdict takes PD and practice, and the model's feedforward too where there are several worlds.
+    A verdict takes PD and learning, and the model's feedforward too where there are several worlds.
     """
     controllers = table.index.get_level_values("controller")
     several = table.index.get_level_values("scenario").nunique() > 1
@@ -36,17 +36,17 @@ def unsaid(table: pd.DataFrame) -> str:
 
 
 def _untaught(summary: pd.DataFrame) -> str:
-    """Whether no stride taught practice anything, with the reasons counted."""
+    """Whether no stride taught learning anything, with the reasons counted."""
     found = lessons(summary, controller=LEARNER)
     if found is None:
         metrics = summary[summary["controller"] == LEARNER]["metric"]
         if (metrics == "strides_to_converge").any():  # an earlier version's, which does not say
             return ""
-        return "learning was never switched on, so that practice is PD"
+        return "learning was never switched on, so that learning is PD"
     if found.taught:
         return ""
     counted = ", ".join(f"{count} {reason}" for reason, count in found.skipped.items())
-    return f"practice learned from none of its {found.strides} strides of learning ({counted})"
+    return f"learning learned from none of its {found.strides} strides of learning ({counted})"
 
 
 def _unpaired(table: pd.DataFrame, against: str) -> str:
@@ -60,4 +60,4 @@ def _unpaired(table: pd.DataFrame, against: str) -> str:
     values = [float(table.loc[LEARNER, f"{joint}_{compared}"]) for joint in SHOWN]
     if np.isfinite(values).all():
         return ""
-    return f"no robot has an error to compare under both practice and {other}"
+    return f"no robot has an error to compare under both learning and {other}"

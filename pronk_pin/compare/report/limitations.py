@@ -21,7 +21,7 @@ _STEADY_APEX = 0.004
 def limitations(results: Results) -> list[str]:
     """Sentences, each about one limitation."""
     summary = results.summary()
-    found = [
+    sentences = [
         *_of_the_robot(results),
         *_of_the_sample(results, summary),
         *_of_the_metrics(summary),
@@ -29,16 +29,19 @@ def limitations(results: Results) -> list[str]:
         *_of_the_motion(summary),
         *_of_the_record(results),
     ]
-    return [text for text in found if text]
+    return [text for text in sentences if text]
 
 
 def _of_the_robot(results: Results) -> Iterator[str]:
     if results.experiment.base == "locked":
         yield "The trunk is locked to the sagittal plane without rotation, as in the paper."
     else:
-        told = [name for name in results.experiment.controllers if not load_controller(name).imu]
-        if told:
-            yield f"Under {_listed(told)} the robots know the true attitude of their trunks."
+        with_true_attitude = [
+            name for name in results.experiment.controllers if not load_controller(name).imu
+        ]
+        if with_true_attitude:
+            names = _listed(with_true_attitude)
+            yield f"Under {names} the robots know the true attitude of their trunks."
     learners = [name for name in results.experiment.controllers if any(load_controller(name).laws)]
     stance_only = [name for name in learners if load_controller(name).flight_law is None]
     if stance_only:
@@ -46,9 +49,9 @@ def _of_the_robot(results: Results) -> Iterator[str]:
             f"{_listed(stance_only)} learn{'s' if len(stance_only) == 1 else ''} in stance only: "
             "what is left of the error is mostly the touchdown transient, which comes from flight."
         )
-    if results.experiment.world:
+    if results.experiment.mjcf:
         yield (
-            f"The simulated robot is that of {Path(results.experiment.world).name}, and the gaits "
+            f"The simulated robot is that of {Path(results.experiment.mjcf).name}, and the gaits "
             "are planned with our model: errors hold what the two have otherwise."
         )
     yield (
@@ -58,9 +61,9 @@ def _of_the_robot(results: Results) -> Iterator[str]:
 
 
 def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
-    worlds, seeds = results.experiment.scenarios, results.experiment.seeds
+    scenarios, seeds = results.experiment.scenarios, results.experiment.seeds
     first = summary["controller"].iloc[0]
-    families = {family(world) for world in worlds}
+    families = {family(scenario) for scenario in scenarios}
     cells = itertools.product(sorted(families), summary["controller"].unique(), SHOWN)
     means = sum(np.isfinite(_mean_of(summary, *cell)) for cell in cells)
     if not means:
@@ -72,11 +75,11 @@ def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
         yield (
             f"{count}: fewer than {LEAST_UNITS} are no sample, so intervals are drawn over the "
             f"{len(results.experiment.speeds)} speeds. They say how the mean would scatter over "
-            "speeds and starting postures like these, not over other worlds."
+            "speeds and starting postures like these, not over other scenarios."
         )
-    if any(map(sampled, worlds)):
+    if any(map(sampled, scenarios)):
         yield (
-            "The sampled worlds are drawn from ranges that we have chosen (docs/worlds.md has "
+            "The sampled scenarios are drawn from ranges that we have chosen (docs/worlds.md has "
             "them): intervals over them speak of worlds like these, at the speeds "
             f"{', '.join(f'{speed:g}' for speed in results.experiment.speeds)} m/s."
         )

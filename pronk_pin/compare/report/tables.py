@@ -32,7 +32,7 @@ _MOVING = 0.05
 """Speed from which on a robot goes somewhere, so that its transport has a cost [m/s]."""
 
 
-WORLD = {
+SHOWN_PARAMETERS = {
     "payload": ("payload [kg]", 1.0, ".1f"),
     "torque_constant": ("torque given", 1.0, ".0%"),
     "armature": ("rotor [g m²]", 1e3, ".1f"),
@@ -42,11 +42,11 @@ WORLD = {
     "ground_friction": ("ground friction", 1.0, ".2f"),
     "slope": ("slope [rad]", 1.0, "+.3f"),
 }
-"""What is drawn of a sampled world and matters to every base: column, factor of it, format."""
+"""What is drawn of a sampled scenario and matters to every base: column, factor of it, format."""
 
 
-def sampled_worlds(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
-    """Each sampled world of a family: what it is like, and the mean errors in it.
+def sampled_scenarios(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
+    """Each sampled scenario of a family: what it is like, and the mean errors in it.
 
     Means are over the robots that did not fall.
 
@@ -55,23 +55,23 @@ def sampled_worlds(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
         scenario: The family.
 
     Returns:
-        Rows by world, from the one in which practice (`ilc`) leaves the smallest calf error to the
-        one with the largest; columns ("world", attribute of `Scenario`), ("calf" and "thigh",
+        Rows by world, from the one in which learning (`ilc`) leaves the smallest calf error to the
+        one with the largest; columns ("scenario", attribute of `Scenario`), ("calf" and "thigh",
         controller) [rad] and ("fallen", controller).
     """
-    mine = in_family(summary, scenario)
-    controllers = list(dict.fromkeys(mine["controller"]))
+    family_rows = in_family(summary, scenario)
+    controllers = list(dict.fromkeys(family_rows["controller"]))
     columns: dict[tuple[str, str], Any] = {}
-    worlds = {name: load_scenario(name) for name in mine["scenario"].unique()}
-    for attribute in WORLD:
-        columns["world", attribute] = pd.Series(
-            {name: getattr(world, attribute) for name, world in worlds.items()}
+    scenarios = {name: load_scenario(name) for name in family_rows["scenario"].unique()}
+    for attribute in SHOWN_PARAMETERS:
+        columns["scenario", attribute] = pd.Series(
+            {name: getattr(values, attribute) for name, values in scenarios.items()}
         )
     for joint, name in itertools.product(SHOWN, controllers):
-        peaks = robots(mine, scenario=scenario, controller=name, joint=joint)
+        peaks = robots(family_rows, scenario=scenario, controller=name, joint=joint)
         columns[joint, name] = peaks.groupby(level="scenario").mean().mean(axis="columns")
     for name in controllers:
-        up = robots(mine, scenario=scenario, controller=name, metric="upright", joint="-")
+        up = robots(family_rows, scenario=scenario, controller=name, metric="upright", joint="-")
         columns["fallen", name] = (up == 0.0).sum(axis="columns").groupby(level="scenario").sum()
     table = pd.DataFrame(columns).rename_axis("scenario")
     order = ("calf", "ilc") if "ilc" in controllers else ("calf", controllers[0])
@@ -85,7 +85,7 @@ def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
 
     Args:
         summary: The summary of a result that holds `pd` and `ilc`.
-        scenario: The world.
+        scenario: The scenario.
 
     Returns:
         Rows by speed, and one of means over the speeds that have all of ours; columns by joint,
@@ -142,17 +142,18 @@ def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
 
     Args:
         summary: See `compare.metrics`.
-        scenario: A world, or a family of sampled ones.
+        scenario: A scenario, or a family of sampled ones.
     """
-    mine = in_family(summary, scenario)
-    names = [str(name) for name in mine["controller"].unique()]
-    rows = {name: _row(mine, scenario, name, rivals=set(names) - {name}) for name in names}
+    family_rows = in_family(summary, scenario)
+    names = [str(name) for name in family_rows["controller"].unique()]
+    rows = {name: _row(family_rows, scenario, name, rivals=set(names) - {name}) for name in names}
     table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("controller")
     return table.sort_values("calf", ascending=False)
 
 
 def answer(summary: pd.DataFrame) -> pd.DataFrame:
-    """The overviews of all worlds, indexed by scenario and controller, in the summary's order."""
+    """The overviews of all scenarios, indexed by scenario and controller, in the summary's
+    order."""
     families = list(dict.fromkeys(map(family, summary["scenario"].unique())))
     return pd.concat(
         {name: overview(summary, scenario=name) for name in families}, names=["scenario"]
@@ -161,46 +162,46 @@ def answer(summary: pd.DataFrame) -> pd.DataFrame:
 
 def _row(summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[str]) -> Any:
     """A controller's row of `overview`."""
-    mine: dict[str, Any] = {"scenario": scenario, "controller": controller}
+    cell: dict[str, Any] = {"scenario": scenario, "controller": controller}
 
     own = summary[summary["controller"] == controller]
 
     def values(metric: str, joint: str = "-") -> Array:
-        found = robots(own, **mine, metric=metric, joint=joint)
-        return np.asarray(found.to_numpy(dtype=float)).ravel()
+        values_of_robots = robots(own, **cell, metric=metric, joint=joint)
+        return np.asarray(values_of_robots.to_numpy(dtype=float)).ravel()
 
     row: dict[str, Any] = {}
     for joint in SHOWN:
-        row |= _interval(joint, mean_interval(robots(own, **mine, joint=joint)))
+        row |= _interval(joint, mean_interval(robots(own, **cell, joint=joint)))
         row[f"{joint}_rms"] = _mean(values("rms_error", joint))
         if "pd" in rivals:
-            found = compare_controllers(summary, **mine, against="pd", joint=joint)
-            row |= _interval(f"{joint}_reduction", found.reduction)
+            comparison = compare_controllers(summary, **cell, against="pd", joint=joint)
+            row |= _interval(f"{joint}_reduction", comparison.reduction)
         if RIVAL in rivals:
-            found = compare_controllers(summary, **mine, against=RIVAL, joint=joint)
-            sign = {True: 1, None: 0, False: -1}[found.better]
-            row[f"{joint}_model"] = sign if found.pairs else np.nan
-            row |= _interval(f"{joint}_difference", found.difference)
-            row |= _interval(f"{joint}_wins", found.improvement)
+            comparison = compare_controllers(summary, **cell, against=RIVAL, joint=joint)
+            sign = {True: 1, None: 0, False: -1}[comparison.better]
+            row[f"{joint}_model"] = sign if comparison.pairs else np.nan
+            row |= _interval(f"{joint}_difference", comparison.difference)
+            row |= _interval(f"{joint}_wins", comparison.improvement)
     settled = values("strides_to_converge")
     row["strides"] = float(settled.max()) if settled.size else np.nan
     found_lessons = lessons(summary, controller=controller)
     row["taught"] = np.nan if found_lessons is None else found_lessons.taught
     row["beat_strides"], row["beat"], row["learners"] = beaten(summary, controller=controller)
     row["feedback"] = _mean(values("feedback_share"))
-    cost = robots(own, **mine, metric="cost_of_transport", joint="-")
+    cost = robots(own, **cell, metric="cost_of_transport", joint="-")
     row["cost"] = _mean(cost.loc[:, np.abs(cost.columns.to_numpy(float)) > _MOVING].to_numpy(float))
     row["speed_error"] = _mean(np.abs(values("speed_error")))
     row["apex_error"] = _mean(np.abs(values("apex_error")))
     upright = own[own["metric"] == "upright"]["value"]
     row["upright"], row["fell"] = int((upright == 1.0).sum()), int((upright == 0.0).sum())
     row["robots"] = len(upright)
-    row["unit"] = unit_of(robots(own, **mine, metric="upright", joint="-"))
+    row["unit"] = unit_of(robots(own, **cell, metric="upright", joint="-"))
     return row
 
 
-def _interval(name: str, found: Interval) -> dict[str, float]:
-    return {name: found.value, f"{name}_low": found.low, f"{name}_high": found.high}
+def _interval(name: str, interval: Interval) -> dict[str, float]:
+    return {name: interval.value, f"{name}_low": interval.low, f"{name}_high": interval.high}
 
 
 def _mean(values: Array) -> float:

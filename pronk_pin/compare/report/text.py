@@ -11,19 +11,19 @@ import pandas as pd
 
 from ..metrics import CONFIDENCE, LEARNER, control_arm, family, in_family
 from .inconclusive import inconclusive, unsaid
-from .tables import SHOWN, answer, beside_the_paper, overview, sampled_worlds, worst_reduction
+from .tables import SHOWN, answer, beside_the_paper, overview, sampled_scenarios, worst_reduction
 
 _WIDTH = 100
 
 
 def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None = None) -> str:
-    """The answer for one world in words; empty without `pd` and `ilc`.
+    """The answer for one scenario in words; empty without `pd` and `ilc`.
 
     Where there is nothing to answer from, it says so, and why.
 
     Args:
         summary: See `compare.metrics`.
-        scenario: The world.
+        scenario: The scenario.
         table: Its `overview`, if it is there already.
     """
     table = overview(summary, scenario=scenario) if table is None else table
@@ -31,26 +31,26 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
         return ""
     if reason := inconclusive(summary, scenario=scenario, table=table, against="pd"):
         return _joined(f"Nothing is concluded: {reason}.", _fallen(table), _control_arm(summary))
-    practice = table.loc[LEARNER]
-    if practice["unit"] == "world":
+    learning = table.loc[LEARNER]
+    if learning["unit"] == "scenario":
         return _sampled_verdict(summary, scenario, table)
     worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
     less = " and ".join(
-        f"{_percent(practice, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
+        f"{_percent(learning, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
     )
     settled = (
-        f", within {_count(int(practice['strides']), 'stride')} at every speed."
-        if np.isfinite(practice["strides"])
+        f", within {_count(int(learning['strides']), 'stride')} at every speed."
+        if np.isfinite(learning["strides"])
         else "; at some speed it has not settled."
     )
     sentences = [
-        f"Practice cuts the mean peak error by {less} against PD ({worst['calf']:.0%} and "
+        f"Learning cuts the mean peak error by {less} against PD ({worst['calf']:.0%} and "
         f"{worst['thigh']:.0%} at the worst speed){settled}"
     ]
     if reason := _no_rival(summary, scenario, table):
         sentences.append(reason)
     elif "model" in table.index:
-        sentences.append(_against_the_model(practice, table.loc["model"]))
+        sentences.append(_against_the_model(learning, table.loc["model"]))
     return _joined(*sentences, _fallen(table), _control_arm(summary))
 
 
@@ -63,31 +63,31 @@ def _no_rival(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) -> str:
 
 
 def _sampled_verdict(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) -> str:
-    """The answer for a family of sampled worlds, each of which counts once."""
-    practice, drawn = table.loc[LEARNER], in_family(summary, scenario)
-    worlds, speeds = drawn["scenario"].nunique(), drawn["speed"].nunique()
+    """The answer for a family of sampled scenarios, each of which counts once."""
+    learning, drawn = table.loc[LEARNER], in_family(summary, scenario)
+    scenarios, speeds = drawn["scenario"].nunique(), drawn["speed"].nunique()
     worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
     less = " and ".join(
-        f"{_percent(practice, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
+        f"{_percent(learning, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
     )
     sentences = [
-        f"In {worlds} sampled worlds, at {_count(speeds, 'speed')} in each, practice cuts the mean "
-        f"peak error by {less} against PD ({worst['calf']:.0%} and {worst['thigh']:.0%} for the "
-        "worst robot)."
+        f"In {scenarios} sampled scenarios, at {_count(speeds, 'speed')} in each, learning cuts "
+        f"the mean peak error by {less} against PD ({worst['calf']:.0%} and {worst['thigh']:.0%} "
+        "for the worst robot)."
     ]
     if reason := _no_rival(summary, scenario, table):
         sentences.append(reason)
     elif "model" in table.index:
-        sentences += _against_the_model_by_world(summary, scenario, table)
+        sentences += _against_the_model_by_scenario(summary, scenario, table)
     return _joined(*sentences, _fallen(table), _control_arm(summary))
 
 
-def _against_the_model_by_world(
+def _against_the_model_by_scenario(
     summary: pd.DataFrame, scenario: str, table: pd.DataFrame
 ) -> Iterator[str]:
-    practice, model = table.loc[LEARNER], table.loc["model"]
-    by_world = sampled_worlds(summary, scenario=scenario)
-    signs = [int(practice[f"{joint}_model"]) for joint in SHOWN]
+    learning, model = table.loc[LEARNER], table.loc["model"]
+    by_scenario = sampled_scenarios(summary, scenario=scenario)
+    signs = [int(learning[f"{joint}_model"]) for joint in SHOWN]
     if set(signs) == {1}:
         yield "It beats the model's feedforward in calf and thigh beyond doubt."
     else:
@@ -99,38 +99,38 @@ def _against_the_model_by_world(
         yield f"It {' and '.join(parts)}."
     for joint in SHOWN:
         change, low, high = (
-            1e3 * practice[f"{joint}_difference{end}"] for end in ("", "_low", "_high")
+            1e3 * learning[f"{joint}_difference{end}"] for end in ("", "_low", "_high")
         )
-        both = by_world[joint][[LEARNER, "model"]].dropna()
+        both = by_scenario[joint][[LEARNER, "model"]].dropna()
         ahead = int((both[LEARNER] < both["model"]).sum())
         yield (
-            f"The {joint}'s mean peak is {1e3 * practice[joint]:.1f} against "
+            f"The {joint}'s mean peak is {1e3 * learning[joint]:.1f} against "
             f"{1e3 * model[joint]:.1f} mrad, by paired differences {change:+.1f} mrad ({low:+.1f} "
             f"to {high:+.1f}); it is less in {ahead} of {_count(len(both), 'world')}, and the "
-            f"probability that a robot improves is {_percent(practice, f'{joint}_wins')}."
+            f"probability that a robot improves is {_percent(learning, f'{joint}_wins')}."
         )
-    if practice["beat"] > 0:
+    if learning["beat"] > 0:
         yield (
-            f"{practice['beat']:.0f} of {practice['learners']:.0f} robots come to beat the model "
+            f"{learning['beat']:.0f} of {learning['learners']:.0f} robots come to beat the model "
             "in both joints and stay there, after "
-            f"{practice['beat_strides']:.0f} strides in the median."
+            f"{learning['beat_strides']:.0f} strides in the median."
         )
 
 
-def _against_the_model(practice: pd.Series, model: pd.Series) -> str:
-    wins = [joint for joint in SHOWN if practice[f"{joint}_model"] > 0]
-    open_ = [joint for joint in SHOWN if practice[f"{joint}_model"] == 0]
+def _against_the_model(learning: pd.Series, model: pd.Series) -> str:
+    wins = [joint for joint in SHOWN if learning[f"{joint}_model"] > 0]
+    open_ = [joint for joint in SHOWN if learning[f"{joint}_model"] == 0]
     beats = "beats" if wins else "does not beat"
     where = f" in the {wins[0]} only" if len(wins) == 1 else ""
     doubt = f" (in the {' and '.join(open_)} the difference may be chance)" if open_ else ""
     numbers = ", ".join(
-        f"{practice[joint]:.4f} against {model[joint]:.4f} rad in the {joint}" for joint in SHOWN
+        f"{learning[joint]:.4f} against {model[joint]:.4f} rad in the {joint}" for joint in SHOWN
     )
     text = f"It {beats} the model's feedforward{where}{doubt}: {numbers}."
-    if practice["beat"] > 0:
+    if learning["beat"] > 0:
         text += (
-            f" {practice['beat']:.0f} of {practice['learners']:.0f} robots beat it in both joints, "
-            f"after {practice['beat_strides']:.0f} strides in the median."
+            f" {learning['beat']:.0f} of {learning['learners']:.0f} robots beat it in both joints, "
+            f"after {learning['beat_strides']:.0f} strides in the median."
         )
     return text
 
@@ -159,7 +159,7 @@ def _control_arm(summary: pd.DataFrame) -> str:
 
 
 def suite_verdict(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -> str:
-    """The answer for all worlds in words; empty without `pd`, `ilc` and `model`.
+    """The answer for all scenarios in words; empty without `pd`, `ilc` and `model`.
 
     Args:
         summary: See `compare.metrics`.
@@ -169,17 +169,17 @@ def suite_verdict(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -
     controllers = set(table.index.get_level_values("controller"))
     if not {"pd", LEARNER, "model"} <= controllers:
         return ""
-    practice = table.xs(LEARNER, level="controller")
+    learning = table.xs(LEARNER, level="controller")
     reasons = {
         str(world): inconclusive(
             summary, scenario=str(world), table=table.loc[world], against="model"
         )
-        for world in practice.index
+        for world in learning.index
     }
-    told = practice.loc[[world for world, reason in reasons.items() if not reason]]
+    told = learning.loc[[world for world, reason in reasons.items() if not reason]]
     sentences = [
-        f"Does practice beat the model? In {_count(len(practice), 'world')}, against the model's "
-        f"feedforward, by {CONFIDENCE:.0%} intervals of the paired difference:"
+        f"Does practice beat the model? In {_count(len(learning), 'scenario')}, against the "
+        f"model's feedforward, by {CONFIDENCE:.0%} intervals of the paired difference:"
     ]
     sentences += _where_it_beats_the_model(told) if len(told) else []
     sentences += [
@@ -190,7 +190,7 @@ def suite_verdict(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -
 
 
 def _where_it_beats_the_model(practice: pd.DataFrame) -> Iterator[str]:
-    """What practice does in those worlds that tell, one a row."""
+    """What learning does in those worlds that tell, one a row."""
     for joint in SHOWN:
         better, worse, open_ = (
             list(practice.index[practice[f"{joint}_model"] == sign]) for sign in (1, -1, 0)
@@ -203,7 +203,7 @@ def _where_it_beats_the_model(practice: pd.DataFrame) -> Iterator[str]:
     median = practice["beat_strides"].median()
     yield (
         f"{beat:.0f} of {learners:.0f} robots come to beat it in both joints and stay there"
-        + (f", the worlds' median is {median:.0f} strides." if beat else ".")
+        + (f", the scenarios' median is {median:.0f} strides." if beat else ".")
     )
 
 
@@ -239,7 +239,7 @@ def _joined(*sentences: str) -> str:
 
 
 def answer_in_words(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -> str:
-    """The verdict over one world or all of them, or why the experiment cannot have one.
+    """The verdict over one scenario or all of them, or why the experiment cannot have one.
 
     Args:
         summary: See `compare.metrics`.
@@ -282,7 +282,7 @@ def beside_note(table: pd.DataFrame) -> str:
 
 
 def format_suite(summary: pd.DataFrame) -> str:
-    """The overviews of all worlds and the verdict over them, as text for a terminal."""
+    """The overviews of all scenarios and the verdict over them, as text for a terminal."""
     table = answer(summary)
     parts = []
     for scenario in dict.fromkeys(table.index.get_level_values("scenario")):
@@ -341,7 +341,7 @@ def units_of_intervals(table: pd.DataFrame) -> str:
 def against_model(row: pd.Series) -> str:
     """Whether calf and thigh are better than with the model's feedforward: yes, no, or open.
 
-    A dash where no robot stayed up under both, and of practice that nothing taught.
+    A dash where no robot stayed up under both, and of learning that nothing taught.
     """
     signs = [row.get(f"{joint}_model", np.nan) for joint in SHOWN]
     if row.get("taught", np.nan) == 0 or np.isnan(signs).any():

@@ -1,4 +1,4 @@
-"""One simulation: n robots, one controller, one world, event by event.
+"""One simulation: n robots, one controller, one scenario, event by event.
 
 Comes in: gaits, a `ControllerSpec`, a `Scenario`, a `Schedule`.
 Goes out: a log of strides and ticks, and its labelled dataset.

@@ -87,10 +87,10 @@ class TickLog:
             tape.velocity[:, ticks] - self.joint_rates[at, ticks],
         )
         self.feedback[at, ticks], self.feedforward[at, ticks] = feedback, feedforward
-        asked = feedback + feedforward
+        commanded = feedback + feedforward
         if self.turns:
-            asked += self.balance[at, ticks]
-        self.missing[at, ticks] = np.clip(asked, -tau_max, tau_max) - asked
+            commanded += self.balance[at, ticks]
+        self.missing[at, ticks] = np.clip(commanded, -tau_max, tau_max) - commanded
 
     def torque(self, rows: IntArray, ticks: slice) -> Array:
         """Commanded torque of the motors, within their limits [N m], shape (m, ticks, 12)."""
@@ -106,7 +106,7 @@ class TickLog:
         for name in self._torques:
             getattr(self, name)[rows] = getattr(other, name)[rows]
 
-    def phase(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+    def phase(self, rows: IntArray, length: IntArray, *, sensed: int = 0) -> PhaseLog:
         """Make the controller's log of a phase that has ended after so many ticks (m,).
 
         It may share the log's memory, and holds until something else is written.
@@ -119,7 +119,7 @@ class TickLog:
             self.feedforward[at],
             self.missing[at],
             length,
-            felt,
+            sensed,
             load=self.force[at][..., 2].sum(axis=-1),
             pose=self.pose[at] if self.turns else None,
             twist=self.twist[at] if self.turns else None,
@@ -202,14 +202,15 @@ class StrideLog:
         ticks = int(np.ceil(LONGEST_PART * self._planned.max() / timestep))
         shape = (n, LAST, len(PARTS), ticks)
         self._ticks = {
-            name: np.full((*shape, *one), np.nan, np.float32) for name, one in self.TICKS.items()
+            name: np.full((*shape, *shape_of_tick), np.nan, np.float32)
+            for name, shape_of_tick in self.TICKS.items()
         }
 
-    def begin(self, rows: IntArray, start: Array, learning: BoolArray, *, left: Array) -> None:
-        """Begin strides at the times `start` (m,) [s], with `left` (m,) [s] to go."""
+    def begin(self, rows: IntArray, start: Array, learning: BoolArray, *, remaining: Array) -> None:
+        """Begin strides at the times `start` (m,) [s], with `remaining` (m,) [s] to go."""
         at = (rows, self.count[rows])
         self.scalars["start"][at], self.scalars["learning"][at] = start, learning
-        self._close[rows] = left < self._near[rows]
+        self._close[rows] = remaining < self._near[rows]
 
     def stance(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
         """Log a stance of so many ticks (m,)."""

@@ -16,7 +16,7 @@ from .log import SAMPLES, SHORTEST_STRIDE, StrideLog
 _COPIES = 3
 """A finished log, the dataset that is made of it, and its file are in memory together."""
 
-SHORTER = "shorten --schedule.practice and --schedule.learning, or give fewer --speeds"
+SHORTER = "shorten --schedule.baseline and --schedule.learning, or give fewer --speeds"
 
 
 def log_size(gaits: Sequence[Gait], duration: float) -> float:

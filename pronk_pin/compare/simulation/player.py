@@ -19,7 +19,7 @@ from ...control import (
     PhaseLog,
     Tape,
     TouchdownDetector,
-    TrunkKnown,
+    TrunkEstimate,
     clip_torque,
     phase_grid,
 )
@@ -51,7 +51,7 @@ class Player:
         robot: The robot.
         gaits: The gait of each of the n robots.
         spec: The controller, whose gains and balance act at every tick.
-        scenario: The world.
+        scenario: The scenario.
         ticks: Length of the longest tape.
         rng: Source of the sensors' noise.
         base: How the trunks may move, see `build_model`.
@@ -62,7 +62,7 @@ class Player:
         world: The robots in MuJoCo.
         motors, sensors: Theirs.
         log: The phase that they are in, as it truly is.
-        seen: The same as the robots know it: the log itself, where nothing is noisy.
+        sensed: The same as the robots know it: the log itself, where nothing is noisy.
         upright: Which robots have not fallen, shape (n,).
     """
 
@@ -90,7 +90,7 @@ class Player:
         self.world = World(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
         self.sensors = SensorSuite(scenario.sensors, n, rng)
-        self.log = self.seen = TickLog(n, ticks, turns=turns)
+        self.log = self.sensed = TickLog(n, ticks, turns=turns)
         self._level_imu = spec.imu and balance is None  # read a phase at a time
         self._inertial = None  # read at each tick
         if balance is not None and spec.imu:
@@ -104,9 +104,9 @@ class Player:
             )
         if not self._servos and not self._ahead:
             inertial = self._inertial is not None
-            self.seen = TickLog(n, ticks, turns=turns, inertial=inertial)
+            self.sensed = TickLog(n, ticks, turns=turns, inertial=inertial)
         self._balance = balance
-        self._late = spec.touchdown_ticks
+        self._touchdown_delay = spec.touchdown_ticks
         flight = np.array([gait.flight.duration for gait in gaits])
         self._touchdown = TouchdownDetector(spec.contact, robot, flight, timestep=dt)
         self._expected = np.round(_EXPECTED_TOUCHDOWN * flight / dt).astype(np.intp)
@@ -125,32 +125,32 @@ class Player:
         Returns:
             How many ticks were played, shape (m,).
         """
-        world, log, seen = self.world, self.log, self.seen
+        world, log, sensed = self.world, self.log, self.sensed
         airborne = part == 1
-        told = tape.setpoint(self._gains) if self._servos else None
+        setpoints = tape.setpoint(self._gains) if self._servos else None
         played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
         while going.size:
             who, end = rows[going], int(tape.length[going].max())
             stop = min(self._next_stop(who, tick, airborne), end)
             if stop > tape.ticks:
                 tape = tape.held(end)
-                told = told if told is None else tape.setpoint(self._gains)
-            if told is not None:
-                motion = felt = world.play(who, told[going, tick:stop])
+                setpoints = setpoints if setpoints is None else tape.setpoint(self._gains)
+            if setpoints is not None:
+                motion = measured = world.play(who, setpoints[going, tick:stop])
             elif self._ahead:
-                motion = felt = world.play(who, self.motors.coming(who, stop - tick))
+                motion = measured = world.play(who, self.motors.coming(who, stop - tick))
             else:
                 encoders = self.sensors.encoders(who, world.joints[who], world.joint_rates[who])
-                trunk = self._believed(who)
+                trunk = self._estimated_trunk(who)
                 torque = self._torque(who, encoders, trunk, tape, going, tick, part)
                 torque = self.motors.drive(who, torque, world.joint_rates[who])
                 motion = world.play(who, torque[:, None])
-                felt = self._felt(who, motion, encoders, trunk)
-                if trunk is not None and seen.inertial:
-                    seen.specific_force[who, tick] = trunk.specific_force
-                seen.write(who, tick, felt)
+                measured = self._measured_motion(who, motion, encoders, trunk)
+                if trunk is not None and sensed.inertial:
+                    sensed.specific_force[who, tick] = trunk.specific_force
+                sensed.write(who, tick, measured)
             log.write(who, tick, motion)
-            played[going] = self._ends(who, felt, tick, tape.length[going], airborne)
+            played[going] = self._ends(who, measured, tick, tape.length[going], airborne)
             count = np.minimum(played[going], stop) - tick
             world.advance(who, motion, count)
             if self._ahead:
@@ -158,10 +158,10 @@ class Player:
             self._restart_broken(who)
             going, tick = going[played[going] > stop], stop
         if airborne:
-            played = np.maximum(played, 1 + self._late)  # even if it broke before
-        seen.torques(rows, tape, self._gains, self._tau_max, int(played.max()))
-        if seen is not log:
-            log.take_torques(rows, seen)
+            played = np.maximum(played, 1 + self._touchdown_delay)  # even if it broke before
+        sensed.torques(rows, tape, self._gains, self._tau_max, int(played.max()))
+        if sensed is not log:
+            log.take_torques(rows, sensed)
         return played
 
     def _next_stop(self, rows: IntArray, tick: int, airborne: bool) -> int:
@@ -186,7 +186,7 @@ class Player:
         self,
         rows: IntArray,
         encoders: tuple[Array, Array],
-        trunk: TrunkKnown | None,
+        trunk: TrunkEstimate | None,
         tape: Tape,
         going: IntArray,
         tick: int,
@@ -203,11 +203,11 @@ class Player:
                 balance = self._balance.torque(
                     part, rows, tick, trunk[:2], joints, tape.position[going, tick]
                 )
-            self.seen.balance[rows, tick] = balance
+            self.sensed.balance[rows, tick] = balance
             feedback = feedback + balance
         return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
 
-    def _believed(self, rows: IntArray) -> TrunkKnown | None:
+    def _estimated_trunk(self, rows: IntArray) -> TrunkEstimate | None:
         """Estimated state of trunks that may turn: by the IMU, or without one the true state."""
         if self._balance is None:
             return None
@@ -215,14 +215,16 @@ class Player:
             gyro, force = self._inertial.read(rows)
             self._estimator.update(rows, gyro, force)
             return self._estimator.trunk(rows, force)
-        return TrunkKnown(self.world.pose[rows], self.world.twist[rows], np.zeros((len(rows), 3)))
+        return TrunkEstimate(
+            self.world.pose[rows], self.world.twist[rows], np.zeros((len(rows), 3))
+        )
 
-    def _felt(
+    def _measured_motion(
         self,
         rows: IntArray,
         motion: Motion,
         encoders: tuple[Array, Array],
-        trunk: TrunkKnown | None,
+        trunk: TrunkEstimate | None,
     ) -> Motion:
         """One tick's motion as the robots measure it."""
         joints, rates = encoders
@@ -263,9 +265,9 @@ class Player:
             self.world.restart(broken)
             self.upright[broken] = False
 
-    def measured(self, rows: IntArray, length: IntArray, *, felt: int = 0) -> PhaseLog:
+    def measured(self, rows: IntArray, length: IntArray, *, sensed: int = 0) -> PhaseLog:
         """Log of the robots' measurements in a part of the stride of so many ticks (m,)."""
-        phase = self.seen.phase(rows, length, felt=felt)
+        phase = self.sensed.phase(rows, length, sensed=sensed)
         if not self._level_imu:
             return phase
         # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
@@ -282,8 +284,8 @@ class Player:
 
     def rewind(self, rows: IntArray, start: IntArray) -> None:
         """Give the ticks from `start` (m,) on, before a touchdown is sensed, to the next stance."""
-        for log in {id(log): log for log in (self.log, self.seen)}.values():
-            log.rewind(rows, start, self._late)
+        for log in {id(log): log for log in (self.log, self.sensed)}.values():
+            log.rewind(rows, start, self._touchdown_delay)
 
     def tilt(self, part: int, rows: IntArray, length: IntArray) -> Array:
         """Largest angle between trunk and gait in a part of the stride [rad], shape (m,)."""

@@ -8,11 +8,11 @@ from ..._checks import Interval, keep_reals
 from ...errors import InvalidInput
 
 _SHORTEST = 1.0
-"""Shortest practice and learning [s]: even a robot that lies on the ground finishes a stride."""
+"""Shortest learning and learning [s]: even a robot that lies on the ground finishes a stride."""
 
 _LIMITS = {
     "startup": Interval(0, 600, "s"),
-    "practice": Interval(0, 86_400, "s"),
+    "baseline": Interval(0, 86_400, "s"),
     "learning": Interval(0, 86_400, "s"),
     "scatter": Interval(0, 0.5, "rad"),  # beyond, robots fall before they begin
 }
@@ -24,25 +24,25 @@ class Schedule:
 
     Attributes:
         startup: Standing in the posture of the first stride [s].
-        practice: Pronking without learning [s].
+        baseline: Pronking without learning [s].
         learning: Pronking with the law switched on [s].
         scatter: Standard deviation of the joint angles at the start [rad].
     """
 
     startup: float = 0.5
-    practice: float = 20.0
+    baseline: float = 20.0
     learning: float = 20.0
     scatter: float = 0.01
 
     def __post_init__(self) -> None:
         keep_reals(self, _LIMITS, "schedule: ")
-        if self.practice + self.learning < _SHORTEST:
+        if self.baseline + self.learning < _SHORTEST:
             raise InvalidInput(
-                f"practice and learning of {self.practice:g} + {self.learning:g} s are too short "
+                f"learning and learning of {self.baseline:g} + {self.learning:g} s are too short "
                 f"for a stride; make them {_SHORTEST:g} s or more together"
             )
 
     @property
     def duration(self) -> float:
         """Duration of the whole simulation [s]."""
-        return self.startup + self.practice + self.learning
+        return self.startup + self.baseline + self.learning

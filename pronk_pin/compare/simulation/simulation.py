@@ -39,7 +39,7 @@ class Simulation:
         robot: The robot.
         gaits: The gait of each of the n robots.
         spec: The controller.
-        scenario: The world.
+        scenario: The scenario.
         schedule: What happens when.
         rng: Source of the scatter at the start.
         feedforward: Feedforward to begin with [N m], shape (n, 2, samples, 12).
@@ -117,7 +117,7 @@ class Simulation:
             progress: Called with the number of steps done since the last call.
         """
         schedule = self.schedule
-        steps = round((schedule.practice + schedule.learning) / self._dt)
+        steps = round((schedule.baseline + schedule.learning) / self._dt)
         done, lock = 0, threading.Lock()
 
         def report() -> None:
@@ -155,14 +155,14 @@ class Simulation:
         controller, strides, player = self.controller, self.strides, self.player
         log, late = player.log, controller.spec.touchdown_ticks
         start = self._clock[rows]
-        learning = start >= round(self.schedule.practice / self._dt)
+        learning = start >= round(self.schedule.baseline / self._dt)
         learning &= any(law is not None for law in controller.spec.laws)
-        strides.begin(rows, self._seconds(start), learning, left=self._seconds(steps - start))
+        strides.begin(rows, self._seconds(start), learning, remaining=self._seconds(steps - start))
 
         stance = player.play(rows, controller.touchdown(rows, learning), part=0)
-        tape, record = controller.liftoff(rows, player.measured(rows, stance, felt=late))
-        if player.seen is not log:  # what is kept is the truth
-            record = controller.record(0, rows, log.phase(rows, stance, felt=late))
+        tape, record = controller.liftoff(rows, player.measured(rows, stance, sensed=late))
+        if player.sensed is not log:  # what is kept is the truth
+            record = controller.record(0, rows, log.phase(rows, stance, sensed=late))
         strides.stance(rows, record, log, stance)
         tilt = player.tilt(0, rows, stance)
 
@@ -170,9 +170,9 @@ class Simulation:
         flight = player.play(rows, tape, part=1) - late
         duration, upright = self._seconds(stance + flight), self.upright[rows]
         tilt = np.maximum(tilt, player.tilt(1, rows, flight))
-        known = player.measured(rows, flight)
-        record = controller.landing(rows, known, duration, upright)
-        if player.seen is not log:
+        measured_log = player.measured(rows, flight)
+        record = controller.landing(rows, measured_log, duration, upright)
+        if player.sensed is not log:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)
         player.rewind(rows, flight)

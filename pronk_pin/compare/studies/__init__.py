@@ -12,8 +12,8 @@ from .prediction import (
     Prediction,
     compare_prediction,
     describe_prediction,
-    practise,
-    stored_practice,
+    simulate_learning,
+    stored_learning,
 )
 from .reproduce import format_reproduction
 from .seeding import describe_seeding, measure_seeding, stayed_up
@@ -33,8 +33,8 @@ __all__ = [
     "format_reproduction",
     "measure_seeding",
     "measure_transfers",
-    "practise",
+    "simulate_learning",
     "stayed_up",
-    "stored_practice",
+    "stored_learning",
     "sweep_gains",
 ]

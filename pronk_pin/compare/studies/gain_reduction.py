@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..._checks import Interval, reals
-from ...control import ControllerSpec, Gains, Skill
+from ...control import ControllerSpec, Gains, InitialFeedforward
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ...robot import JOINTS, NL, Robot, load_robot
@@ -20,9 +20,9 @@ from ..world import Scenario
 
 SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Feedback gains of the sweep, over the controller's own."""
-NOTHING = Skill()
+NO_FEEDFORWARD = InitialFeedforward()
 """Initial feedforward of a robot that has not learned."""
-_PRACTICE, _LEARNING, _REPLAY = 4.0, 16.0, 16.0
+_BASELINE, _LEARNING, _REPLAY = 4.0, 16.0, 16.0
 
 
 def sweep_gains(
@@ -38,7 +38,7 @@ def sweep_gains(
     Args:
         spec: A controller that learns.
         speeds: Desired speeds [m/s].
-        scenario: The world.
+        scenario: The scenario.
         robot: Short name of the robot.
         shares: Feedback gains, over the controller's own.
 
@@ -56,19 +56,19 @@ def sweep_gains(
         raise InvalidInput("no speeds or no shares; give at least one of each")
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
-    practice = simulate(machine, gaits, spec, scenario, Schedule(0.5, _PRACTICE, _LEARNING))
-    controller = practice.controller
-    learned = Skill(controller.feedforward, controller.flight)
+    learning = simulate(machine, gaits, spec, scenario, Schedule(0.5, _BASELINE, _LEARNING))
+    controller = learning.controller
+    learned = InitialFeedforward(controller.feedforward, controller.flight)
     rows = []
     for share in shares:
-        for skill in (NOTHING, learned):
+        for initial in (NO_FEEDFORWARD, learned):
             gains = Gains(_scaled(spec.gains.kp, share), _scaled(spec.gains.kd, share))
             replay = replace(spec, law=None, flight_law=None, gains=gains)
-            if skill is NOTHING:
-                replay = replace(replay, timing=None)  # practice finds that out, too
+            if initial is NO_FEEDFORWARD:
+                replay = replace(replay, timing=None)  # learning finds that out, too
             schedule = Schedule(0.5, _REPLAY, 0.0)
-            done = simulate(machine, gaits, replay, scenario, schedule, skill)
-            rows.append({"share": share, "learned": skill is learned, **judged(done)})
+            replayed = simulate(machine, gaits, replay, scenario, schedule, initial)
+            rows.append({"share": share, "learned": initial is learned, **mean_peaks(replayed)})
     return pd.DataFrame(rows)
 
 
@@ -117,7 +117,7 @@ def simulate(
     spec: ControllerSpec,
     scenario: Scenario,
     schedule: Schedule,
-    skill: Skill = NOTHING,
+    initial: InitialFeedforward = NO_FEEDFORWARD,
 ) -> Simulation:
     """Run a simulation of a controller, with one seed."""
     simulation = Simulation(
@@ -127,14 +127,14 @@ def simulate(
         scenario,
         schedule=schedule,
         rng=np.random.default_rng(0),
-        feedforward=skill.feedforward,
-        flight=skill.flight,
+        feedforward=initial.feedforward,
+        flight=initial.flight,
     )
     simulation.run()
     return simulation
 
 
-def judged(simulation: Simulation, robot: int | None = None) -> dict[str, float | int]:
+def mean_peaks(simulation: Simulation, robot: int | None = None) -> dict[str, float | int]:
     """Mean peaks over the last strides of the robots, or one, and how many robots stayed up.
 
     Means are over those that stayed up; NaN without one.

@@ -16,11 +16,11 @@ import xarray as xr
 from tqdm import tqdm
 
 from ..._typing import Array
-from ...control import ControllerSpec, Skill, load_controller, model_feedforward
+from ...control import ControllerSpec, InitialFeedforward, load_controller, model_feedforward
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ..experiment import torque_library
-from ..identification import Explanation, mended_gaits
+from ..identification import Explanation, identified_gaits
 from ..metrics import by_joint
 from ..simulation import Schedule, Simulation, to_dataset
 from ..world import Scenario, load_scenario
@@ -29,7 +29,7 @@ CONTROLLERS = ("model", "library", "ilc", "identified", "identified+gait")
 """Controllers that are compared."""
 STRIDES = 10
 """Strides at the end that count."""
-SCHEDULE = Schedule(practice=6.0, learning=12.0)
+SCHEDULE = Schedule(baseline=6.0, learning=12.0)
 """By default; controllers that do not learn make the first part only."""
 
 
@@ -47,9 +47,9 @@ def close_loop(
     """Simulate the identified model beside its competitors.
 
     Args:
-        explanation: What practice found.
+        explanation: What learning found.
         strides: The strides that it was found in; the torque library comes from them.
-        speeds: Speeds [m/s]; by default those halfway between the practised ones.
+        speeds: Speeds [m/s]; by default those halfway between the learned ones.
         scenarios: Worlds; by default the one of the strides, and one with 3 kg more, which the
             model was not identified in.
         controllers: What is compared.
@@ -64,33 +64,43 @@ def close_loop(
     Raises:
         SpeedOutOfRange: The library does not cover a speed.
         InvalidInput: The strides do not tell their scenario.
-        GaitNotFound: The mended model cannot do a gait.
+        GaitNotFound: The identified model cannot do a gait.
     """
     rng = np.random.default_rng(0) if rng is None else rng
     seed = int(rng.integers(2**31))
-    practised = strides["speed"].to_numpy()
-    speeds = tuple(_between(practised) if speeds is None else speeds)
-    worlds = _worlds(strides, scenarios)
+    learned_speeds = strides["speed"].to_numpy()
+    speeds = tuple(_between(learned_speeds) if speeds is None else speeds)
+    scenarios_ = _scenarios(strides, scenarios)
     library = load_library(explanation.robot.name)
     gaits = [library.at(speed) for speed in speeds]
-    again = mended_gaits(explanation.mended, gaits) if "identified+gait" in controllers else gaits
+    again = (
+        identified_gaits(explanation.identified, gaits)
+        if "identified+gait" in controllers
+        else gaits
+    )
     rows = []
     with tqdm(
-        total=len(worlds) * len(controllers),
+        total=len(scenarios_) * len(controllers),
         desc="closing the loop",
         unit=" cells",
         mininterval=0.5,
         disable=not progress,
     ) as bar:
-        for world in worlds:
+        for scenario in scenarios_:
             for name in controllers:
                 spec = load_controller(name)
-                mine = again if spec.mended_gaits else gaits
-                first = _begin(spec, explanation, mine, strides)
-                found = _simulate(
-                    explanation, mine, spec, world, schedule, np.random.default_rng(seed), first
+                played = again if spec.identified_gaits else gaits
+                initial = _begin(spec, explanation, played, strides)
+                simulated = _simulate(
+                    explanation,
+                    played,
+                    spec,
+                    scenario,
+                    schedule,
+                    np.random.default_rng(seed),
+                    initial,
                 )
-                rows += _rows(world.name, name, found)
+                rows += _rows(scenario.name, name, simulated)
                 bar.update()
     return pd.DataFrame(rows)
 
@@ -120,9 +130,12 @@ def _between(speeds: Array) -> Array:
     return np.asarray((speeds[1:] + speeds[:-1]) / 2.0)
 
 
-def _worlds(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> list[Scenario]:
+def _scenarios(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> list[Scenario]:
     if scenarios is not None:
-        return [load_scenario(one) if isinstance(one, str) else one for one in scenarios]
+        return [
+            load_scenario(scenario) if isinstance(scenario, str) else scenario
+            for scenario in scenarios
+        ]
     try:
         own = Scenario.from_json(strides.attrs["scenario_parameters"])
     except (KeyError, InvalidInput) as error:
@@ -134,35 +147,35 @@ def _worlds(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> 
 
 def _begin(
     spec: ControllerSpec, explanation: Explanation, gaits: Sequence[Gait], strides: xr.Dataset
-) -> Skill:
+) -> InitialFeedforward:
     """Initial feedforward of a controller."""
     if spec.source == "library":
-        return torque_library(strides).skill(np.array([gait.speed for gait in gaits]))
+        return torque_library(strides).initial_feedforward(np.array([gait.speed for gait in gaits]))
     if spec.source == "none":
-        return Skill()
-    robot = explanation.mended if spec.source == "identified" else explanation.robot
-    return Skill(model_feedforward(robot, gaits))
+        return InitialFeedforward()
+    robot = explanation.identified if spec.source == "identified" else explanation.robot
+    return InitialFeedforward(model_feedforward(robot, gaits))
 
 
 def _simulate(
     explanation: Explanation,
     gaits: Sequence[Gait],
     spec: ControllerSpec,
-    world: Scenario,
+    scenario: Scenario,
     schedule: Schedule,
     rng: np.random.Generator,
-    first: Skill,
+    initial: InitialFeedforward,
 ) -> xr.Dataset:
     learns = any(law is not None for law in spec.laws)
     simulation = Simulation(
         explanation.robot,
         gaits,
         spec,
-        world,
+        scenario,
         schedule=schedule if learns else replace(schedule, learning=0.0),
         rng=rng,
-        feedforward=first.feedforward,
-        flight=first.flight,
+        feedforward=initial.feedforward,
+        flight=initial.flight,
     )
     return to_dataset(simulation.run(), explanation.robot, gaits, attributes={})
 

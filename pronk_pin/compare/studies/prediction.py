@@ -13,12 +13,12 @@ from ..._checks import Interval, reals, whole
 from ..._typing import Array
 from ...control import (
     ControllerSpec,
-    GuidedStrides,
     LearningLaw,
     LiftedModel,
     ModelBasedILC,
-    Settings,
+    PlanarStrides,
     StrideRecord,
+    StrideSettings,
     lifted_model,
     load_controller,
     phase_grid,
@@ -32,7 +32,7 @@ from ..experiment import Results
 from ..simulation import Schedule, Simulation, to_dataset
 from ..world import Scenario
 
-_PRACTICE = 6.0
+_BASELINE = 6.0
 _WIDTH = 96
 
 
@@ -46,7 +46,7 @@ class Prediction:
         analysis: What linear algebra says of the law along the gait.
         predicted: RMS of the stance error by the lifted model, of hip, thigh and calf [rad],
             shape (strides + 1, 3); the first is the stride before learning.
-        rehearsed: The same by the model's own practice; NaN from where it does not go on.
+        rehearsed: The same by the model's own learning; NaN from where it does not go on.
         measured: The same as it happened.
     """
 
@@ -72,7 +72,7 @@ STRIDES = Interval(1, 100_000)
 """Strides of learning that can be predicted."""
 
 
-def practise(
+def simulate_learning(
     spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario, *, robot: str, strides: int
 ) -> xr.Dataset:
     """Simulate a short learning run, with the law of the stance only, and flights as planned.
@@ -92,13 +92,13 @@ def practise(
         gaits,
         replace(spec, flight_law=None, timing=None),
         scenario,
-        schedule=Schedule(practice=_PRACTICE, learning=1.25 * (strides + 2) * longest),
+        schedule=Schedule(baseline=_BASELINE, learning=1.25 * (strides + 2) * longest),
         rng=np.random.default_rng(0),
     )
     return to_dataset(simulation.run(), load_robot(robot), gaits, attributes={"robot": robot})
 
 
-def stored_practice(
+def stored_learning(
     results: Results, spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario
 ) -> xr.Dataset:
     """Load the strides of learning from a results folder, for comparison with a prediction.
@@ -107,7 +107,7 @@ def stored_practice(
 
     Args:
         results: The results.
-        spec: The controller that practised.
+        spec: The controller that learned.
         speeds: Speeds that are asked for [m/s].
         scenario: In which world.
 
@@ -117,12 +117,12 @@ def stored_practice(
     _law(spec)
     experiment = results.experiment
     if not _covered(spec):
-        known = [name for name in experiment.controllers if _covered(load_controller(name))]
+        suitable = [name for name in experiment.controllers if _covered(load_controller(name))]
         remedy = (
-            f"choose {' or '.join(known)}, which this result has"
-            if known
+            f"choose {' or '.join(suitable)}, which this result has"
+            if suitable
             else "make a result with 'pronk-pin compare --controllers ilc-stance', or leave "
-            "--result out, and a practice in stance only is simulated"
+            "--result out, and a learning in stance only is simulated"
         )
         raise InvalidInput(
             f"controller '{spec.name}' has learned in flight, too, or how long a flight lasts, and "
@@ -135,7 +135,7 @@ def stored_practice(
         )
     for speed in speeds:
         if not np.isclose(experiment.speeds, speed, atol=1e-6).any():
-            there = ", ".join(f"{one:g}" for one in experiment.speeds)
+            there = ", ".join(f"{available:g}" for available in experiment.speeds)
             raise InvalidInput(f"this result has no speed {speed:g} m/s; choose from {there}")
     return results.all_strides(controller=spec.name, scenario=scenario.name)
 
@@ -149,10 +149,10 @@ def compare_prediction(
     a law that needs a model has one of its own without them, as on the robot.
 
     Args:
-        spec: The controller that practised.
+        spec: The controller that learned.
         strides: Its strides, see `compare.simulation.dataset`.
         speed: Which robot [m/s].
-        scenario: The world that they were made in.
+        scenario: The scenario that they were made in.
         number: Strides of learning; fewer if there are fewer.
 
     Raises:
@@ -160,54 +160,57 @@ def compare_prediction(
     """
     law = _law(spec)
     robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
-    settings = Settings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
+    settings = StrideSettings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
     rotors = Rotors(scenario.armature, scenario.damping)
     model = lifted_model(robot, gait, settings, rotors=rotors)
     if isinstance(law, ModelBasedILC):
-        law = law.along([lifted_model(robot, gait, settings)])
-    mine = strides.sel(speed=speed, method="nearest").sel(part="stance")
-    made = int(mine["count"])
-    first = int(np.argmax(mine["learning"].to_numpy()[:made] == 1))
+        law = law.bind([lifted_model(robot, gait, settings)])
+    of_speed = strides.sel(speed=speed, method="nearest").sel(part="stance")
+    count = int(of_speed["count"])
+    first = int(np.argmax(of_speed["learning"].to_numpy()[:count] == 1))
     if first == 0:
-        raise InvalidInput("no strides before the learning; give the practice some seconds")
-    error = mine["error"].to_numpy()[first - 1 : min(made, first + number)]
-    begin = _record(mine.isel(stride=first - 1), model)
-    guided = GuidedStrides(robot, gait, settings, rotors)
+        raise InvalidInput("no strides before the learning; give the learning some seconds")
+    error = of_speed["error"].to_numpy()[first - 1 : min(count, first + number)]
+    begin = _record(of_speed.isel(stride=first - 1), model)
+    planar = PlanarStrides(robot, gait, settings, rotors)
     kept = slice(None, None, (model.shape[0] - 1) // (error.shape[1] - 1))
     return Prediction(
         spec.name,
         speed,
         analyze(law, model, begin),
         predicted=_by_joint(predict(law, model, begin, len(error) - 1)[:, kept]),
-        rehearsed=_by_joint(rehearse(guided, law, begin, len(error) - 1)[:, kept]),
+        rehearsed=_by_joint(rehearse(planar, law, begin, len(error) - 1)[:, kept]),
         measured=_by_joint(error),
     )
 
 
 def describe_prediction(prediction: Prediction) -> str:
     """Format the analysis and the comparison for a terminal."""
-    found = prediction.analysis
-    quasi = found.quasi_static
-    stable = "stable" if found.radius < 1.0 else "unstable"
-    left = 1.0 - quasi.left
+    analysis = prediction.analysis
+    quasi = analysis.quasi_static
+    stable = "stable" if analysis.radius < 1.0 else "unstable"
+    removed = 1.0 - quasi.left
     lines = [
         f"{prediction.controller} at {prediction.speed:g} m/s",
-        f"  spectral radius           {found.radius:8.3f}  ({stable})",
-        f"  with every stride reset   {found.stride_radius:8.3f}",
-        f"  largest singular value    {found.largest_gain:8.3f}",
-        f"  transient growth          {found.transient:8.3f}",
+        f"  spectral radius           {analysis.radius:8.3f}  ({stable})",
+        f"  with every stride reset   {analysis.stride_radius:8.3f}",
+        f"  largest singular value    {analysis.largest_gain:8.3f}",
+        f"  transient growth          {analysis.transient:8.3f}",
         "  error left in the limit   "
         + ", ".join(
-            f"{joint} {_percent(value)}" for joint, value in zip(JOINTS, found.limit, strict=True)
+            f"{joint} {_percent(value)}"
+            for joint, value in zip(JOINTS, analysis.limit, strict=True)
         ),
         "  radius with other motors  "
         + ", ".join(
-            f"x{factor:g} {radius:.3f}" for factor, radius in found.with_gain_error.items()
+            f"x{factor:g} {radius:.3f}" for factor, radius in analysis.with_gain_error.items()
         ),
         "  radius with delay         "
-        + ", ".join(f"{delay} samples {radius:.3f}" for delay, radius in found.with_delay.items()),
+        + ", ".join(
+            f"{delay} samples {radius:.3f}" for delay, radius in analysis.with_delay.items()
+        ),
         "",
-        textwrap.fill(_in_words(quasi.gain, quasi.memory, quasi.multiplier, left), _WIDTH),
+        textwrap.fill(_in_words(quasi.gain, quasi.memory, quasi.multiplier, removed), _WIDTH),
         "",
         "           measured [rad]    lifted model [rad]        rehearsed [rad]",
         "  stride    thigh    calf     thigh    calf  factor     thigh    calf  factor",

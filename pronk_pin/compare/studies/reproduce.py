@@ -34,8 +34,8 @@ def _legs(values: xr.DataArray) -> xr.DataArray:
 
 
 def _front_left(values: xr.DataArray) -> xr.DataArray:
-    mine = values.sel(joint=[f"{_LEG}_{joint}" for joint in ("hip", "thigh", "calf")])
-    return mine.assign_coords(joint=["hip", "thigh", "calf"]).mean("stride")
+    joints = values.sel(joint=[f"{_LEG}_{joint}" for joint in ("hip", "thigh", "calf")])
+    return joints.assign_coords(joint=["hip", "thigh", "calf"]).mean("stride")
 
 
 def _late(end: xr.Dataset) -> xr.DataArray:
@@ -66,7 +66,7 @@ def row_by_row(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") ->
 
     Args:
         summary: The summary of a result that holds `pd` and the learner.
-        scenario: The world.
+        scenario: The scenario.
         learner: The controller that stands for the paper's ILC.
 
     Returns:
@@ -82,16 +82,16 @@ def row_by_row(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") ->
                 for metric in ("peak_error", "rms_error")
             )
             for speed in peaks.columns:
-                found = mean_interval(peaks[[speed]])
+                interval = mean_interval(peaks[[speed]])
                 rows.append(
                     {
                         "joint": joint,
                         "controller": paper,
                         "speed": speed,
                         "paper": printed.get((joint, paper, speed), np.nan),
-                        "peak": found.value,
-                        "peak_low": found.low,
-                        "peak_high": found.high,
+                        "peak": interval.value,
+                        "peak_low": interval.low,
+                        "peak_high": interval.high,
                         "rms": float(squares[speed].mean()),
                     }
                 )
@@ -117,9 +117,11 @@ def readings(results: Results, *, learners: tuple[str, ...]) -> pd.DataFrame:
             ratios = []
             for joint in SHOWN:
                 for paper, ours in (("pd", "pd"), ("ilc", learner)):
-                    mine = values[ours][reading].sel(joint=joint)
-                    row[f"{joint} {paper}"] = float(mine.mean())
-                    for speed, value in zip(mine["speed"].to_numpy(), mine.values, strict=True):
+                    values_of = values[ours][reading].sel(joint=joint)
+                    row[f"{joint} {paper}"] = float(values_of.mean())
+                    for speed, value in zip(
+                        values_of["speed"].to_numpy(), values_of.values, strict=True
+                    ):
                         if (joint, paper, speed) in printed.index and np.isfinite(value):
                             ratios.append(np.log(value / printed[joint, paper, speed]))
             row["distance"] = float(np.sqrt(np.mean(np.square(ratios)))) if ratios else float("nan")
@@ -129,7 +131,7 @@ def readings(results: Results, *, learners: tuple[str, ...]) -> pd.DataFrame:
 
 def _read(results: Results, controller: str) -> dict[str, xr.DataArray]:
     """All readings of a controller, by speed and joint, means over its seeds."""
-    found: dict[str, list[xr.DataArray]] = {name: [] for name in READINGS}
+    by_reading: dict[str, list[xr.DataArray]] = {name: [] for name in READINGS}
     for cell in results.experiment.cells():
         if cell.controller == controller:
             strides = results.strides(cell, VARIABLES)
@@ -137,8 +139,8 @@ def _read(results: Results, controller: str) -> dict[str, xr.DataArray]:
             stayed = strides["upright"].min("stride") == 1
             end = steady(strides)
             for name, read in READINGS.items():
-                found[name].append(read(end).where(stayed))
-    return {name: xr.concat(parts, "seed").mean("seed") for name, parts in found.items()}
+                by_reading[name].append(read(end).where(stayed))
+    return {name: xr.concat(parts, "seed").mean("seed") for name, parts in by_reading.items()}
 
 
 def format_reproduction(results: Results, *, learners: tuple[str, ...]) -> str:

@@ -9,7 +9,13 @@ import pandas as pd
 
 from ..._checks import reals
 from ..._typing import Array
-from ...control import ControllerSpec, Skill, TorqueLibrary, load_controller, model_feedforward
+from ...control import (
+    ControllerSpec,
+    InitialFeedforward,
+    TorqueLibrary,
+    load_controller,
+    model_feedforward,
+)
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ...robot import JOINTS, Robot, load_robot
@@ -17,8 +23,8 @@ from ..metrics import STEADY_STRIDES, settling_stride
 from ..report import number
 from ..simulation import Schedule, Simulation
 from ..world import Scenario
-from .gain_reduction import NOTHING, simulate
-from .transfer import COMPARED, practise_library
+from .gain_reduction import NO_FEEDFORWARD, simulate
+from .transfer import COMPARED, learn_library
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")
 """The same laws, from nothing, from the model's feedforward, and from the torque library."""
@@ -34,9 +40,9 @@ def measure_seeding(
     """Learn at the inner speeds from each initial feedforward; the library holds the others only.
 
     Args:
-        speeds: Increasing speeds [m/s], three or more. The library is practised at all of them,
+        speeds: Increasing speeds [m/s], three or more. The library is learned at all of them,
             and each inner one begins with what its neighbours learned.
-        scenario: The world.
+        scenario: The scenario.
         robot: Short name of the robot.
 
     Returns:
@@ -49,18 +55,18 @@ def measure_seeding(
     """
     speeds = reals("speeds", speeds)
     if len(speeds) < 3:
-        raise InvalidInput("seeding needs three speeds or more: one between two that are practised")
+        raise InvalidInput("seeding needs three speeds or more: one between two that are learned")
     if np.any(np.diff(speeds) <= 0.0):
         raise InvalidInput("the speeds must increase; give each once, the lowest first")
     machine, gaits_ = load_robot(robot), load_library(robot)
     gaits = [gaits_.at(speed) for speed in speeds]
     specs = [load_controller(name) for name in LEARNERS]
-    _, stored = practise_library(machine, gaits, specs[0], scenario)
+    _, stored = learn_library(machine, gaits, specs[0], scenario)
     tables = []
     for spec in specs:
-        seed = _seed(spec, machine, gaits[1:-1], stored)
-        done = simulate(machine, gaits[1:-1], spec, scenario, _SCHEDULE, seed)
-        tables.append(_strides(spec, speeds[1:-1], done))
+        initial = _seed(spec, machine, gaits[1:-1], stored)
+        simulation = simulate(machine, gaits[1:-1], spec, scenario, _SCHEDULE, initial)
+        tables.append(_strides(spec, speeds[1:-1], simulation))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -74,7 +80,7 @@ def settling(table: pd.DataFrame) -> pd.DataFrame:
     Args:
         table: What `measure_seeding` returns.
     """
-    found = []
+    rows_out = []
     for speed, rows in table.groupby("speed"):
         curves = {name: _curves(rows, name) for name in LEARNERS}
         nothing = curves[LEARNERS[0]]
@@ -87,8 +93,8 @@ def settling(table: pd.DataFrame) -> pd.DataFrame:
                 else settling_stride(curve[:, j], float(nothing[0, j]), float(final[j])) - 1.0
                 for j in range(len(COMPARED))
             ]
-            found.append({"controller": name, "speed": speed, "strides": float(np.max(counts))})
-    return pd.DataFrame(found)
+            rows_out.append({"controller": name, "speed": speed, "strides": float(np.max(counts))})
+    return pd.DataFrame(rows_out)
 
 
 def stayed_up(table: pd.DataFrame) -> pd.DataFrame:
@@ -106,12 +112,12 @@ def describe_seeding(table: pd.DataFrame) -> str:
         f"begins with   joint   peak [rad]: {peaks}   the end   strides to settle",
     ]
     for name in LEARNERS:
-        mine = table[table["controller"] == name]
-        fell = int((~mine.groupby("speed")["upright"].all()).sum())
-        mine, counts = stayed_up(mine), _of(strides, name)
+        of_controller = table[table["controller"] == name]
+        fell = int((~of_controller.groupby("speed")["upright"].all()).sum())
+        of_controller, counts = stayed_up(of_controller), _of(strides, name)
         took = _settled(counts) + (f", {fell} fell" if fell else "")
         for joint in COMPARED:
-            medians = mine.groupby("stride")[joint].median()
+            medians = of_controller.groupby("stride")[joint].median()
             values = " ".join(f"{number(medians.get(k, np.nan), '.4f'):>9}" for k in SHOWN)
             end = f"{number(medians.iloc[-STEADY_STRIDES:].median(), '.4f'):>9}"
             first = joint == COMPARED[0]
@@ -132,21 +138,21 @@ def _settled(counts: Array) -> str:
 
 def _seed(
     spec: ControllerSpec, robot: Robot, gaits: Sequence[Gait], stored: TorqueLibrary
-) -> Skill:
+) -> InitialFeedforward:
     if spec.source == "model":
-        return Skill(model_feedforward(robot, gaits))
+        return InitialFeedforward(model_feedforward(robot, gaits))
     if spec.source == "library":
         return stored.left_out(np.array([gait.speed for gait in gaits]))[0]
-    return NOTHING
+    return NO_FEEDFORWARD
 
 
-def _strides(spec: ControllerSpec, speeds: Sequence[float], done: Simulation) -> pd.DataFrame:
-    log, rows = done.strides, []
+def _strides(spec: ControllerSpec, speeds: Sequence[float], simulation: Simulation) -> pd.DataFrame:
+    log, rows = simulation.strides, []
     first = np.argmax(log.scalars["learning"] == 1, axis=1)
     length = int((log.count - first).min()) + 1  # as many of each robot
     for k, speed in enumerate(speeds):
-        mine = slice(first[k] - 1, first[k] - 1 + length)
-        peaks = log.peak_error[k, mine]
+        window = slice(first[k] - 1, first[k] - 1 + length)
+        peaks = log.peak_error[k, window]
         legs = peaks.reshape(length, -1, len(JOINTS)).mean(axis=1)  # (length, 3)
         rows.append(
             pd.DataFrame(
@@ -155,7 +161,7 @@ def _strides(spec: ControllerSpec, speeds: Sequence[float], done: Simulation) ->
                     "speed": speed,
                     "stride": np.arange(length),
                     **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
-                    "upright": log.scalars["upright"][k, mine] == 1,
+                    "upright": log.scalars["upright"][k, window] == 1,
                 }
             )
         )
@@ -164,8 +170,8 @@ def _strides(spec: ControllerSpec, speeds: Sequence[float], done: Simulation) ->
 
 def _curves(rows: pd.DataFrame, controller: str) -> Array:
     """Peaks of one robot by stride, (strides, 2)."""
-    mine = rows[rows["controller"] == controller].sort_values("stride")
-    return np.asarray(mine[list(COMPARED)].to_numpy(), dtype=float)
+    of_controller = rows[rows["controller"] == controller].sort_values("stride")
+    return np.asarray(of_controller[list(COMPARED)].to_numpy(), dtype=float)
 
 
 def _of(strides: pd.DataFrame, controller: str) -> Array:

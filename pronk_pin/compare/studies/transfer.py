@@ -18,7 +18,7 @@ from ..experiment import torque_library
 from ..report import number
 from ..simulation import Schedule, Simulation, to_dataset
 from ..world import Scenario
-from .gain_reduction import judged, simulate
+from .gain_reduction import mean_peaks, simulate
 
 TOLERANCE = 0.25
 """Relative excess that the error may have in another task over that where it was learned."""
@@ -26,37 +26,37 @@ COMPARED = ("thigh", "calf")
 """Joints whose errors are compared."""
 
 # At 0.8 m/s it takes 20 s until the touchdown stays at one tick.
-_PRACTICE = Schedule(0.5, 4.0, 28.0)
+_LEARNING_RUN = Schedule(0.5, 4.0, 28.0)
 _REPLAY = Schedule(0.5, 16.0, 0.0)  # the strides that count begin after the start
 
 
 def may_be_reused(replayed: Array, learned: Array, *, tolerance: float = TOLERANCE) -> bool:
     """The rule for another scenario: try the feedforward, keep it if it tracks nearly as at home.
 
-    Between practised speeds `TorqueLibrary.reusable` knows without a trial.
+    Between learned speeds `TorqueLibrary.reusable` knows without a trial.
 
     Args:
         replayed: Errors of the joints in the new task [rad].
-        learned: Their errors where the skill was learned [rad].
+        learned: Their errors where the stored feedforward was learned [rad].
         tolerance: By how much their root mean square may be larger.
     """
     return _rms(replayed) <= (1.0 + tolerance) * _rms(learned)
 
 
-def practise_library(
+def learn_library(
     robot: Robot, gaits: Sequence[Gait], spec: ControllerSpec, scenario: Scenario
 ) -> tuple[Simulation, TorqueLibrary]:
     """Learn until the touchdowns have settled; the library is the mean of the last strides."""
-    practice = simulate(robot, gaits, spec, scenario, _PRACTICE)
-    strides = to_dataset(practice.strides, robot, gaits, attributes={"robot": robot.name})
-    return practice, torque_library(strides)
+    learning = simulate(robot, gaits, spec, scenario, _LEARNING_RUN)
+    strides = to_dataset(learning.strides, robot, gaits, attributes={"robot": robot.name})
+    return learning, torque_library(strides)
 
 
 def measure_transfers(
     spec: ControllerSpec,
     speeds: Sequence[float],
     home: Scenario,
-    worlds: Sequence[Scenario],
+    scenarios: Sequence[Scenario],
     *,
     robot: str = "a1",
 ) -> pd.DataFrame:
@@ -65,16 +65,16 @@ def measure_transfers(
     Args:
         spec: A controller that learns.
         speeds: Increasing speeds [m/s], three or more.
-        home: Where the skill is learned.
-        worlds: Where it is tried.
+        home: Where the stored feedforward is learned.
+        scenarios: Where it is tried.
         robot: Short name of the robot.
 
     Returns:
         A row for each transfer, and for each speed that was left out: `task`; mean peaks over the
-        speeds [rad] of the replayed skill, `thigh` and `calf`, and of one practised there,
-        `thigh_practised` and `calf_practised`; the rule's answer `reuse`, for a speed from what is
+        speeds [rad] of the replayed feedforward, `thigh` and `calf`, and of one learned there,
+        `thigh_relearned` and `calf_relearned`; the rule's answer `reuse`, for a speed from what is
         known of its neighbours, for a world from a trial; and whether that was `right`: whether
-        practice gains no more than the tolerance.
+        learning gains no more than the tolerance.
     """
     speeds = reals("speeds", speeds)
     if spec.law is None:
@@ -89,46 +89,46 @@ def measure_transfers(
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     frozen = replace(spec, law=None, flight_law=None)
-    practice, stored = practise_library(machine, gaits, spec, home)
-    skill, inner = stored.skill(np.array(speeds)), np.array(speeds)[1:-1]
-    left_out, known = stored.left_out(inner)
-    learned = _errors(practice)
+    learning, stored = learn_library(machine, gaits, spec, home)
+    initial, inner = stored.initial_feedforward(np.array(speeds)), np.array(speeds)[1:-1]
+    left_out, reusable = stored.left_out(inner)
+    learned = _errors(learning)
 
-    def row(task: str, replayed: Array, practised: Array, reuse: bool) -> dict[str, object]:
-        gains_little = may_be_reused(replayed, practised)
+    def row(task: str, replayed: Array, relearned_errors: Array, reuse: bool) -> dict[str, object]:
+        gains_little = may_be_reused(replayed, relearned_errors)
         peaks = {"thigh": replayed[0], "calf": replayed[1]}
-        peaks |= {"thigh_practised": practised[0], "calf_practised": practised[1]}
+        peaks |= {"thigh_relearned": relearned_errors[0], "calf_relearned": relearned_errors[1]}
         return {"task": task, **peaks, "reuse": reuse, "right": reuse == gains_little}
 
-    def tried(task: str, replay: Simulation, practised: Simulation) -> dict[str, object]:
+    def tried(task: str, replay: Simulation, relearned_errors: Simulation) -> dict[str, object]:
         errors = _errors(replay)
-        return row(task, errors, _errors(practised), may_be_reused(errors, learned))
+        return row(task, errors, _errors(relearned_errors), may_be_reused(errors, learned))
 
-    at_home = simulate(machine, gaits, frozen, home, _REPLAY, skill)
-    rows = [tried("at home", at_home, practice)]
+    at_home = simulate(machine, gaits, frozen, home, _REPLAY, initial)
+    rows = [tried("at home", at_home, learning)]
     between = simulate(machine, gaits[1:-1], frozen, home, _REPLAY, left_out)
     for k, speed in enumerate(inner):
-        # Robots do not know of each other: practice at home was practice at this speed, too.
-        errors, practised = _errors(between, k), _errors(practice, k + 1)
-        rows.append(row(f"left out {speed:+.2f} m/s", errors, practised, bool(known[k])))
-    for world in worlds:
-        replayed = simulate(machine, gaits, frozen, world, _REPLAY, skill)
-        anew = simulate(machine, gaits, spec, world, _PRACTICE)
-        rows.append(tried(world.name, replayed, anew))
+        # Robots do not know of each other: learning at home was learning at this speed, too.
+        errors, relearned_errors = _errors(between, k), _errors(learning, k + 1)
+        rows.append(row(f"left out {speed:+.2f} m/s", errors, relearned_errors, bool(reusable[k])))
+    for scenario in scenarios:
+        replayed = simulate(machine, gaits, frozen, scenario, _REPLAY, initial)
+        relearned = simulate(machine, gaits, spec, scenario, _LEARNING_RUN)
+        rows.append(tried(scenario.name, replayed, relearned))
     return pd.DataFrame(rows)
 
 
 def describe_transfers(table: pd.DataFrame) -> str:
     """Format the transfers for a terminal."""
     lines = [
-        "                    stored skill [rad]   practised there [rad]   the rule",
+        "                    stored feedforward [rad]   learned there [rad]   the rule",
         "task                  thigh    calf         thigh    calf",
     ]
     for row in table.itertuples():
-        advice = "reuse" if row.reuse else "practise again"
+        advice = "reuse" if row.reuse else "learn again"
         answer = "right" if row.right else "wrong"
         if np.isnan(row.calf_practised):
-            answer = "open, as no robot stayed up that practised there"
+            answer = "open, as no robot stayed up that learned there"
         peaks = [
             f"{number(peak, '.4f'):>7}"
             for peak in (row.thigh, row.calf, row.thigh_practised, row.calf_practised)
@@ -141,27 +141,27 @@ def describe_transfers(table: pd.DataFrame) -> str:
 
 
 def _in_words(table: pd.DataFrame) -> str:
-    table = table.dropna(subset=[f"{joint}_practised" for joint in COMPARED])
+    table = table.dropna(subset=[f"{joint}_relearned" for joint in COMPARED])
     if table.empty:
-        return "Nothing is concluded: no robot stayed up that practised."
+        return "Nothing is concluded: no robot stayed up that learned."
     between = table[table["task"].str.startswith("left out")].dropna()
     more = [
-        number(between[joint].mean() / between[f"{joint}_practised"].mean() - 1.0, "+.0%")
+        number(between[joint].mean() / between[f"{joint}_relearned"].mean() - 1.0, "+.0%")
         for joint in COMPARED
     ]
     wrong = table[~table["right"]]
     harmful, needless = int(wrong["reuse"].sum()), int((~wrong["reuse"]).sum())
     return (
-        f"At speeds left out the stored skill's mean error is {more[0]} in the thigh and "
-        f"{more[1]} in the calf\nagainst practice there. Of {len(table)} answers of the rule "
-        f"{harmful} let a skill be reused that practice would better\nby more than "
-        f"{TOLERANCE:.0%}, and {needless} asked for practice that gained less."
+        f"At speeds left out the stored feedforward's mean error is {more[0]} in the thigh and "
+        f"{more[1]} in the calf\nagainst learning there. Of {len(table)} answers of the rule "
+        f"{harmful} let stored feedforward be reused that learning would better\nby more than "
+        f"{TOLERANCE:.0%}, and {needless} asked for learning that gained less."
     )
 
 
 def _errors(simulation: Simulation, robot: int | None = None) -> Array:
-    found = judged(simulation, robot)
-    return np.array([found[joint] for joint in COMPARED], dtype=float)
+    peaks = mean_peaks(simulation, robot)
+    return np.array([peaks[joint] for joint in COMPARED], dtype=float)
 
 
 def _rms(values: Array) -> float:

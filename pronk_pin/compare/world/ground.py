@@ -36,7 +36,7 @@ def add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
     Args:
         spec: The robot; its feet are geometries named as `robot.foot_names`.
         robot: The robot.
-        scenario: The world.
+        scenario: The scenario.
     """
     contact: _Contact = {
         "solref": [scenario.ground_time_constant, 1],

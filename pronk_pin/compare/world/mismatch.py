@@ -98,4 +98,4 @@ MISMATCHES = (
     *("payload", "weak-motors", "armature", "damping", "coulomb"),
     *("soft-ground", "slippery", "slope", "delay"),
 )
-"""The laboratory's list: single mismatches of the nominal world, each in reach of the gaits."""
+"""The laboratory's list: single mismatches of the nominal scenario, each in reach of the gaits."""

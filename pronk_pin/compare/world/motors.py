@@ -22,7 +22,7 @@ class Motors:
 
     def __init__(self, scenario: Scenario, tau_max: Array, n: int) -> None:
         self._scenario, self._tau_max = scenario, tau_max
-        self._late = np.zeros((n, scenario.delay_ticks, len(tau_max)))  # commands on their way
+        self._queue = np.zeros((n, scenario.delay_ticks, len(tau_max)))  # commands on their way
 
     def coming(self, rows: IntArray, ticks: int) -> Array:
         """Commands that take effect in the next ticks, at most as many as the delay.
@@ -30,13 +30,13 @@ class Motors:
         Returns:
             Torques [N m], shape (m, ticks, 12).
         """
-        return self._late[rows, :ticks]
+        return self._queue[rows, :ticks]
 
     def command(self, rows: IntArray, commands: Array, ticks: IntArray) -> None:
         """Queue commands (m, most, 12) of so many ticks (m,), by which time goes on."""
-        queue = np.concatenate([self._late[rows], commands], axis=1)
-        late = np.arange(self._late.shape[1])
-        self._late[rows] = queue[np.arange(len(rows))[:, None], ticks[:, None] + late]
+        queue = np.concatenate([self._queue[rows], commands], axis=1)
+        delay = np.arange(self._queue.shape[1])
+        self._queue[rows] = queue[np.arange(len(rows))[:, None], ticks[:, None] + delay]
 
     def drive(self, rows: IntArray, command: Array, rates: Array) -> Array:
         """Compute the torques of robots at this tick, after delay and limits [N m], shape (m, 12).
@@ -47,7 +47,7 @@ class Motors:
             rates: Joint velocities [rad/s], shape (m, 12).
         """
         torque = command
-        if self._late.shape[1]:
+        if self._queue.shape[1]:
             torque = self.coming(rows, 1)[:, 0]
             self.command(rows, command[:, None], np.ones(len(rows), dtype=np.intp))
         return np.asarray(np.where(torque * rates > 0.0, self._driven(torque, rates), torque))

@@ -3,8 +3,8 @@
 Scenarios go by name: `nominal`, `payload`, `payload=2+slope`, `ideal+delay`, `random-0-3`. A name
 is a world to begin with, and what is different in it, joined by `+`. Each mismatch has a value of
 its own, and takes another after `=`, in SI units. Without a world in front a mismatch is one of the
-nominal world. A cell of an experiment knows its scenario by name only, so a name says everything:
-the seed of a sampled world stands in it too.
+nominal scenario. A cell of an experiment knows its scenario by name only, so a name says
+everything: the seed of a sampled scenario stands in it too.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ _VECTORS = {
 
 @dataclass(frozen=True)
 class Scenario:
-    """The true parameters of a simulated world.
+    """The true parameters of a simulated scenario.
 
     The robot is what its URDF or MJCF says; what the scenario adds comes on top of that.
 
@@ -205,7 +205,7 @@ class Scenario:
         return (-self.gravity * math.sin(self.slope), 0.0, -self.gravity * math.cos(self.slope))
 
 
-WORLDS = {
+BASE_SCENARIOS = {
     scenario.name: scenario
     for scenario in (
         Scenario("ideal"),
@@ -231,7 +231,7 @@ def load_scenario(name: str, *, mjcf: str = "") -> Scenario:
     first, *rest = text("scenario", name).split("+")
     scenario = _world(first)
     if scenario is None:
-        scenario, rest = WORLDS["nominal"], [first, *rest]
+        scenario, rest = BASE_SCENARIOS["nominal"], [first, *rest]
     values = _values(name, rest)
     changes: dict[str, Any] = {}
     for part, value in values.items():
@@ -254,7 +254,7 @@ def _world(name: str) -> Scenario | None:
     sampled = _SAMPLED.fullmatch(name)
     if sampled:
         return _sample(*map(int, sampled.groups()))
-    return WORLDS.get(name)
+    return BASE_SCENARIOS.get(name)
 
 
 def _values(name: str, parts: list[str]) -> dict[str, float]:
@@ -265,7 +265,7 @@ def _values(name: str, parts: list[str]) -> dict[str, float]:
             raise InvalidInput(f"scenario '{name}': a world, as {part}, comes first in a name")
         mismatch, equals, number = part.partition("=")
         if mismatch not in KNOWN:
-            raise UnknownName("scenario", part, (*WORLDS, *KNOWN, "random-SEED-INDEX"))
+            raise UnknownName("scenario", part, (*BASE_SCENARIOS, *KNOWN, "random-SEED-INDEX"))
         if mismatch in values:
             raise InvalidInput(f"scenario '{name}': {mismatch} is in it twice; keep one of them")
         try:
@@ -286,7 +286,7 @@ def _written(part: str, value: float) -> str:
 
 
 def random_scenarios(n: int, seed: int) -> tuple[Scenario, ...]:
-    """Sampled worlds: everything that the model alone expresses is off at once, within reason.
+    """Sampled scenarios: everything that the model alone expresses is off at once, within reason.
 
     Args:
         n: How many.
@@ -321,5 +321,5 @@ def _sample(seed: int, index: int) -> Scenario:
     )
 
 
-SCENARIOS = {name: load_scenario(name) for name in (*WORLDS, *KNOWN)}
+SCENARIOS = {name: load_scenario(name) for name in (*BASE_SCENARIOS, *KNOWN)}
 """The worlds to begin with, and each mismatch alone."""

@@ -17,7 +17,7 @@ def load_trunk(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
 
     Args:
         trunk: The trunk; its inertia stands in `inertia` and `iquat`.
-        scenario: The world.
+        scenario: The scenario.
     """
     trunk.ipos = np.array(trunk.ipos) + np.array(scenario.com_shift)
     if scenario.payload == 0.0:

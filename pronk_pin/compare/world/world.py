@@ -1,4 +1,4 @@
-"""The simulated world: robots in MuJoCo, from the same URDF, with the scenario's mismatches.
+"""The simulated scenario: robots in MuJoCo, from the same URDF, with the scenario's mismatches.
 
 The base is locked to the sagittal plane without rotation, as in the paper (section III): the trunk
 has two slides, x and z. `qpos` and `qvel` stay inside this module; what it takes and gives is in
@@ -135,7 +135,7 @@ class World:
 
     Args:
         robot: The robot.
-        scenario: The world.
+        scenario: The scenario.
         n: Number of robots.
         base: How the trunks may move, see `build_model`.
         servo: Gains of servos at the joints, whose controls are then set points (see
@@ -216,18 +216,18 @@ class World:
         m, ticks = control.shape[:2]
         path = np.empty((m, ticks + 1, self._state.shape[1]))
         path[:, 0] = self._state[rows]
-        told = np.zeros((m, ticks, mujoco.mj_stateSize(self.model, self._control)))
-        told[..., self._ctrl] = control
+        controls = np.zeros((m, ticks, mujoco.mj_stateSize(self.model, self._control)))
+        controls[..., self._ctrl] = control
         if self.scenario.pushes:
             time = path[:, :1, 0] + self.scenario.timestep * np.arange(ticks)  # (m, ticks)
-            told[..., self._push] = push_force(self.scenario, time)
+            controls[..., self._push] = push_force(self.scenario, time)
         states = np.empty((m, ticks, path.shape[2]))
         sensors = np.empty((m, ticks, self.model.nsensordata))
         self._rollout.rollout(
             self._models[:m],
             [self._data],
             path[:, 0].copy(),
-            told,
+            controls,
             control_spec=self._control,
             skip_checks=True,
             nstep=ticks,

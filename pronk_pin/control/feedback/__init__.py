@@ -11,7 +11,7 @@ from .estimation import (
     AttitudeEstimator,
     AttitudeFilter,
     SpeedEstimator,
-    TrunkKnown,
+    TrunkEstimate,
 )
 from .foot_placement import FootPlacement
 from .speed import LegAngleRegulator
@@ -26,7 +26,7 @@ __all__ = [
     "FootPlacement",
     "LegAngleRegulator",
     "SpeedEstimator",
-    "TrunkKnown",
+    "TrunkEstimate",
     "attitude_angle",
     "attitude_error",
     "roll_pitch_yaw",

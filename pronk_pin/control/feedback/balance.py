@@ -108,7 +108,7 @@ class Balance:
         ]
         self._force = np.stack(force)  # (n, ticks, 4, 3)
         self._share = spec.placement.share(self._s[:, 1])
-        self._aside = np.zeros(len(gaits))
+        self._sideways_offset = np.zeros(len(gaits))
 
     @property
     def at_touchdown(self) -> Array:
@@ -117,7 +117,7 @@ class Balance:
 
     def lift_off(self, rows: IntArray, sideways: Array) -> None:
         """Note the sideways speeds (m,) with which robots leave the ground, in the world [m/s]."""
-        self._aside[rows] = self._spec.placement.aside(sideways)
+        self._sideways_offset[rows] = self._spec.placement.aside(sideways)
 
     def torque(
         self,
@@ -214,7 +214,9 @@ class Balance:
         self, rows: IntArray, tick: int, rotation: Array, desired: Array, reference: Array
     ) -> Array:
         turn = np.swapaxes(rotation, -1, -2) @ desired
-        offset = self._aside[rows, None] * rotation[:, 1, :]  # the world's y in the trunk's axes
+        offset = (
+            self._sideways_offset[rows, None] * rotation[:, 1, :]
+        )  # the world's y in the trunk's axes
         share = self._share[rows, tick]
         moved = placed(self._geometry, _by_leg(reference), turn, offset, share)
         change = moved.reshape(reference.shape) - reference

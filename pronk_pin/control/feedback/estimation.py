@@ -116,7 +116,7 @@ class AttitudeFilter:
         keep_reals(self, checks, "attitude filter: ")
 
 
-class TrunkKnown(NamedTuple):
+class TrunkEstimate(NamedTuple):
     """What m robots know of their trunks at one tick."""
 
     pose: Array
@@ -180,7 +180,7 @@ class AttitudeEstimator:
             after = before * Rotation.from_rotvec(self._timestep * turn)
             self.quaternion[rows] = after.as_quat()
 
-    def trunk(self, rows: IntArray, specific_force: Array) -> TrunkKnown:
+    def trunk(self, rows: IntArray, specific_force: Array) -> TrunkEstimate:
         """What some robots know of their trunks.
 
         Args:
@@ -188,7 +188,7 @@ class AttitudeEstimator:
             specific_force: What their accelerometers say, shape (m, 3).
         """
         nothing = np.zeros((len(rows), 3))
-        return TrunkKnown(
+        return TrunkEstimate(
             np.hstack([nothing, self.quaternion[rows]]),
             np.hstack([nothing, self.rate[rows]]),
             specific_force,

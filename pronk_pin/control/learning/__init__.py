@@ -12,18 +12,19 @@ from .laws import (
     PDTypeILC,
     StrideSelection,
     anti_windup,
-    given,
+    delivered,
     known_law,
     learned_by,
 )
 from .lifted import LiftedModel
 from .model_based import ModelBasedILC, NormOptimalILC, PlantInversionILC
 from .symmetry import symmetric
-from .torque_library import Skill, TorqueLibrary
+from .torque_library import InitialFeedforward, TorqueLibrary
 
 __all__ = [
     "SKIPPED",
     "CurrentIterationILC",
+    "InitialFeedforward",
     "LearningLaw",
     "LiftedModel",
     "ModelBasedILC",
@@ -31,11 +32,10 @@ __all__ = [
     "PDTypeILC",
     "PaperILC",
     "PlantInversionILC",
-    "Skill",
     "StrideSelection",
     "TorqueLibrary",
     "anti_windup",
-    "given",
+    "delivered",
     "known_law",
     "learned_by",
     "symmetric",

@@ -74,7 +74,7 @@ class StrideSelection:
         return np.asarray(self.skipped(record) == 0)
 
 
-def given(record: StrideRecord) -> StrideRecord:
+def delivered(record: StrideRecord) -> StrideRecord:
     """The record with the torques that the motors delivered; saturation cuts the feedback first.
 
     The paper's law stores the recorded torque; what the motors could not give is not in it.

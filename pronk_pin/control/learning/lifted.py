@@ -24,7 +24,7 @@ class LiftedModel:
     """Linear maps from the feedforward u and the state x at touchdown to a stride's errors.
 
         e_k = e_0 - angle u_k - angle_start x_k,    e'_k = e'_0 - rate u_k - rate_start x_k,
-        x_{k+1} = carry x_k + push u_k,
+        x_{k+1} = A x_k + B u_k,
 
     all of them differences from one stride. Stacked vectors hold the phase grid sample by sample,
     all joints of a sample together: `u = feedforward.reshape(-1)` of size samples * joints.
@@ -34,8 +34,8 @@ class LiftedModel:
         rate: Response of the joint velocities [rad/s/(N m)], shape (size, size).
         angle_start: Response of the joint angles to the state at touchdown, shape (size, states).
         rate_start: Response of the joint velocities to it, shape (size, states).
-        carry: Derivative of the next touchdown's state by this one's, shape (states, states).
-        push: Derivative of the next touchdown's state by the feedforward, shape (states, size).
+        A: Derivative of the next touchdown's state by this one's, shape (states, states).
+        B: Derivative of the next touchdown's state by the feedforward, shape (states, size).
         gains: Feedback gains that the model is closed with.
         torque: Feedforward that the gait asks for [N m], shape (samples, joints).
     """
@@ -44,30 +44,30 @@ class LiftedModel:
     rate: Array
     angle_start: Array
     rate_start: Array
-    carry: Array
-    push: Array
+    A: Array
+    B: Array
     gains: Gains
     torque: Array
 
     def __post_init__(self) -> None:
-        names = ("angle", "rate", "angle_start", "rate_start", "carry", "push", "torque")
+        names = ("angle", "rate", "angle_start", "rate_start", "A", "B", "torque")
         given = {name: getattr(self, name) for name in names}
         for name, array in zip(given, numbers(**given), strict=True):
             object.__setattr__(self, name, array)
         instance_of("gains", self.gains, Gains)
-        if self.torque.ndim != 2 or self.carry.ndim != 2:
+        if self.torque.ndim != 2 or self.A.ndim != 2:
             raise InvalidInput(
-                f"torque and carry of the shapes {self.torque.shape} and {self.carry.shape}; give "
+                f"torque and carry of the shapes {self.torque.shape} and {self.A.shape}; give "
                 "(samples, joints) and (states, states)"
             )
-        size, states = self.torque.size, len(self.carry)
+        size, states = self.torque.size, len(self.A)
         shapes = {
             "angle": (size, size),
             "rate": (size, size),
             "angle_start": (size, states),
             "rate_start": (size, states),
-            "carry": (states, states),
-            "push": (states, size),
+            "A": (states, states),
+            "B": (states, size),
         }
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
@@ -98,9 +98,9 @@ class LiftedModel:
         """The static model: its response is that of the strides once the touchdown has settled.
 
         A model with resets and the response
-        `angle + angle_start (1 - carry)^-1 push`.
+        `angle + angle_start (1 - A)^-1 B`.
         """
-        start = np.linalg.solve(np.eye(len(self.carry)) - self.carry, self.push)
+        start = np.linalg.solve(np.eye(len(self.A)) - self.A, self.B)
         return LiftedModel.with_resets(
             self.angle + self.angle_start @ start,
             self.rate + self.rate_start @ start,
@@ -144,7 +144,7 @@ class LiftedModel:
     def land(self, feedforward: Array, begin: StrideRecord, state: Array) -> Array:
         """Predict differences of the next touchdown's states (n, states); arguments of `stride`."""
         change = (feedforward - begin.feedforward).reshape(len(feedforward), -1)
-        return np.asarray(state @ self.carry.T + change @ self.push.T)
+        return np.asarray(state @ self.A.T + change @ self.B.T)
 
     def delayed(self, samples: int) -> LiftedModel:
         """The model with the feedforward delayed by some samples of the grid."""
@@ -160,5 +160,5 @@ class LiftedModel:
             self,
             angle=self.angle @ actuator,
             rate=self.rate @ actuator,
-            push=self.push @ actuator,
+            B=self.B @ actuator,
         )

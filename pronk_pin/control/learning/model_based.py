@@ -27,7 +27,7 @@ SPLINES = 12
 _DEGREE = 3
 
 
-class Answers(NamedTuple):
+class ErrorResponse(NamedTuple):
     """Response of the errors of the strides ahead to changes of the feedforward in a basis."""
 
     basis: Array
@@ -36,20 +36,20 @@ class Answers(NamedTuple):
     """Decrease of the errors of the first, second, ... stride, shape (horizon, size, m)."""
 
     @classmethod
-    def of(cls, model: LiftedModel, *, splines: int | None, horizon: int) -> Answers:
-        """Compute the response of a model, `G_j = angle B + angle_start X_j`, in a basis B.
+    def of(cls, model: LiftedModel, *, splines: int | None, horizon: int) -> ErrorResponse:
+        """Compute the response of a model, `G_j = angle P + angle_start X_j`, in a basis P.
 
-        X_j is the state at the j-th touchdown: `X_{j+1} = carry X_j + push B`, `X_1 = 0`.
+        X_j is the state at the j-th touchdown: `X_{j+1} = A X_j + B P`, `X_1 = 0`.
         `splines=None` takes every sample as it is.
         """
         samples, joints = model.shape
         curves = np.eye(samples) if splines is None else spline_basis(samples, splines)
         basis = np.asarray(np.kron(curves, np.eye(joints)), dtype=float)
-        state = np.zeros((len(model.carry), basis.shape[1]))
-        direct, touchdown, responses = model.angle @ basis, model.push @ basis, []
+        state = np.zeros((len(model.A), basis.shape[1]))
+        direct, touchdown, responses = model.angle @ basis, model.B @ basis, []
         for _ in range(horizon):
             responses.append(direct + model.angle_start @ state)
-            state = model.carry @ state + touchdown
+            state = model.A @ state + touchdown
         return cls(basis, np.asarray(np.stack(responses), dtype=float))
 
 
@@ -64,44 +64,46 @@ def spline_basis(samples: int, splines: int) -> Array:
 
 @dataclass(frozen=True)
 class ModelBasedILC:
-    """A learning law that needs the lifted model of each robot's gait, which `along` binds.
+    """A learning law that needs the lifted model of each robot's gait, which `bind` binds.
 
     Attributes:
         splines: B-splines a joint that make up the feedforward; None for one a sample.
         horizon: Number of strides ahead whose responses to a change are weighed.
-        answers: The models' responses, one for each robot; empty until `along`.
+        responses: The models' responses, one for each robot; empty until `bind`.
     """
 
     splines: int | None = field(default=SPLINES, kw_only=True)
     horizon: int = field(default=3, kw_only=True)
-    answers: tuple[Answers, ...] = field(default=(), repr=False, compare=False, kw_only=True)
+    responses: tuple[ErrorResponse, ...] = field(
+        default=(), repr=False, compare=False, kw_only=True
+    )
 
     def __post_init__(self) -> None:
         prefix = "a model-based law: "
         whole(f"{prefix}horizon", self.horizon, Interval(1, 100))
         none_or(whole, f"{prefix}splines", self.splines, Interval(_DEGREE + 1, 1000))
 
-    def along(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
+    def bind(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
         """Bind the law to models of the robots, in the order of `StrideRecord.robot`."""
         responses = tuple(
-            Answers.of(model, splines=self.splines, horizon=self.horizon) for model in models
+            ErrorResponse.of(model, splines=self.splines, horizon=self.horizon) for model in models
         )
-        return replace(self, answers=responses)
+        return replace(self, responses=responses)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
         learned = np.empty_like(record.feedforward)
         for robot in np.unique(record.robot):
-            if robot >= len(self.answers):
+            if robot >= len(self.responses):
                 raise InvalidInput(
-                    f"{type(self).__name__} knows the models of {len(self.answers)} robots and "
-                    f"is asked for robot {robot}; give it theirs by `along(models)`"
+                    f"{type(self).__name__} knows the models of {len(self.responses)} robots and "
+                    f"is asked for robot {robot}; give it theirs by `bind(models)`"
                 )
             rows = np.flatnonzero(record.robot == robot)
             errors = record.error[rows].reshape(len(rows), -1)
             memory = record.feedforward[rows].reshape(len(rows), -1)
-            amounts = self._next(int(robot), errors, memory @ self.answers[robot].basis)
-            learned[rows] = (amounts @ self.answers[robot].basis.T).reshape(learned[rows].shape)
+            amounts = self._next(int(robot), errors, memory @ self.responses[robot].basis)
+            learned[rows] = (amounts @ self.responses[robot].basis.T).reshape(learned[rows].shape)
         return learned
 
     def _next(self, robot: int, errors: Array, memory: Array) -> Array:
@@ -137,14 +139,14 @@ class PlantInversionILC(ModelBasedILC):
         }
         keep_reals(self, checks, "plant inversion: ")
 
-    def along(self, models: Sequence[LiftedModel]) -> PlantInversionILC:
-        """See `ModelBasedILC.along`."""
-        bound = super().along(models)
+    def bind(self, models: Sequence[LiftedModel]) -> PlantInversionILC:
+        """See `ModelBasedILC.bind`."""
+        bound = super().bind(models)
         inverses = tuple(
             np.linalg.pinv(response.strides.mean(axis=0), rcond=self.cutoff)
-            for response in bound.answers
+            for response in bound.responses
         )
-        return replace(self, answers=bound.answers, inverses=inverses)
+        return replace(self, responses=bound.responses, inverses=inverses)
 
     def _next(self, robot: int, errors: Array, memory: Array) -> Array:
         change = errors @ self.inverses[robot].T
@@ -181,14 +183,14 @@ class NormOptimalILC(ModelBasedILC):
                 f"got change={self.change:g}, effort={self.effort:g}"
             )
 
-    def along(self, models: Sequence[LiftedModel]) -> NormOptimalILC:
-        """See `ModelBasedILC.along`."""
-        bound, steps = super().along(models), []
-        for response in bound.answers:
+    def bind(self, models: Sequence[LiftedModel]) -> NormOptimalILC:
+        """See `ModelBasedILC.bind`."""
+        bound, steps = super().bind(models), []
+        for response in bound.responses:
             square = np.mean([G.T @ G for G in response.strides], axis=0)
             inverse = np.linalg.inv(square + (self.change + self.effort) * np.eye(len(square)))
             steps.append((inverse @ response.strides.mean(axis=0).T, self.effort * inverse))
-        return replace(self, answers=bound.answers, steps=tuple(steps))
+        return replace(self, responses=bound.responses, steps=tuple(steps))
 
     def _next(self, robot: int, errors: Array, memory: Array) -> Array:
         by_error, by_memory = self.steps[robot]

@@ -22,10 +22,10 @@ LANDS_ALIKE = 5e-4
 """Difference of two flights [s] below which they were learned for the same touchdown: contact is
 sensed at whole milliseconds."""
 _ROUNDING = 1e-6
-_AGAIN = "practise again, and save it with TorqueLibrary.save"
+_AGAIN = "learn again, and save it with TorqueLibrary.save"
 
 
-class Skill(NamedTuple):
+class InitialFeedforward(NamedTuple):
     """Initial feedforward and flight durations of n robots; None is none."""
 
     feedforward: Array | None = None
@@ -91,7 +91,7 @@ class TorqueLibrary:
         """
         return np.asarray(resample(self.torque[None], self._places(speeds)[None])[0])
 
-    def skill(self, speeds: Array) -> Skill:
+    def initial_feedforward(self, speeds: Array) -> InitialFeedforward:
         """Interpolate the torques at speeds (m,), with the flight durations that they fit.
 
         A flight lasts as long as that of the nearest learned speed, the lower of two: a torque
@@ -102,7 +102,7 @@ class TorqueLibrary:
             SpeedOutOfRange: The library does not cover a speed.
         """
         nearest = np.ceil(self._places(speeds) - 0.5 - _ROUNDING).astype(np.intp)
-        return Skill(self.at(speeds), self.flight[nearest])
+        return InitialFeedforward(self.at(speeds), self.flight[nearest])
 
     def reusable(self, speeds: Array) -> BoolArray:
         """Whether the torques at speeds (m,) may be replayed without learning, shape (m,).
@@ -130,7 +130,7 @@ class TorqueLibrary:
                     float(lowest),
                     float(highest),
                     library="torque library",
-                    remedy="practise at speeds around it",
+                    remedy="learn at speeds around it",
                 )
         return np.interp(queries, self.speeds, np.arange(len(self.speeds)))
 
@@ -141,7 +141,7 @@ class TorqueLibrary:
             self.speeds[kept], self.torque[kept], self.spread[kept], self.flight[kept]
         )
 
-    def left_out(self, speeds: Array) -> tuple[Skill, BoolArray]:
+    def left_out(self, speeds: Array) -> tuple[InitialFeedforward, BoolArray]:
         """Initial feedforward at learned speeds (m,), each interpolated from its neighbours only.
 
         Returns:
@@ -151,10 +151,10 @@ class TorqueLibrary:
             SpeedOutOfRange: A speed is the first or the last, or the library does not cover it.
         """
         reduced = [(self.without(speed), np.array([speed])) for speed in speeds]
-        skills = [library.skill(speed) for library, speed in reduced]
-        torque, flight = (np.concatenate(parts) for parts in zip(*skills, strict=True))
+        interpolated = [library.initial_feedforward(speed) for library, speed in reduced]
+        torque, flight = (np.concatenate(parts) for parts in zip(*interpolated, strict=True))
         reusable = [library.reusable(speed) for library, speed in reduced]
-        return Skill(torque, flight), np.concatenate(reusable)
+        return InitialFeedforward(torque, flight), np.concatenate(reusable)
 
     def save(self, path: Path | str) -> None:
         """Write the library to an npz file, whole or not at all.

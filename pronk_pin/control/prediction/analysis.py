@@ -125,7 +125,7 @@ def predict(law: LearningLaw, model: LiftedModel, begin: StrideRecord, strides: 
     Returns:
         Shape (strides + 1, samples, joints), the first that of `begin`.
     """
-    errors, record, state = [begin.error[0]], begin, np.zeros((1, len(model.carry)))
+    errors, record, state = [begin.error[0]], begin, np.zeros((1, len(model.A)))
     for _ in range(strides):
         feedforward = law.update(record)
         state = model.land(record.feedforward, begin, state)
@@ -158,7 +158,7 @@ def iteration(law: LearningLaw, model: LiftedModel, basis: Array) -> Array:
     Returns:
         Shape (m + states, m + states).
     """
-    size, states = basis.shape[1], len(model.carry)
+    size, states = basis.shape[1], len(model.A)
     none = model.record(*np.zeros((3, basis.shape[0])))
     learned_from_none = law.update(none).reshape(1, -1)
     columns = []
@@ -196,9 +196,9 @@ def _limit(
     law: LearningLaw, model: LiftedModel, begin: StrideRecord, operator: Array, basis: Array
 ) -> Array:
     """Errors at the fixed point `z = (1 - T)^-1 c` of the iteration, (samples, joints)."""
-    start = np.concatenate([basis.T @ begin.feedforward.reshape(-1), np.zeros(len(model.carry))])
+    start = np.concatenate([basis.T @ begin.feedforward.reshape(-1), np.zeros(len(model.A))])
     updated = basis.T @ law.update(begin).reshape(-1)
-    change = np.concatenate([updated, np.zeros(len(model.carry))]) - start
+    change = np.concatenate([updated, np.zeros(len(model.A))]) - start
     z = np.linalg.solve(np.eye(len(operator)) - operator, change)  # from the beginning on
     size = basis.shape[1]
     feedforward = begin.feedforward + (basis @ z[:size]).reshape(begin.feedforward.shape)

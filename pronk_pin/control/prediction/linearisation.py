@@ -19,16 +19,16 @@ from .planar_strides import (
     RATE,
     SPEED,
     STATES,
-    GuidedStrides,
+    PlanarStrides,
     PlayedPhase,
-    Settings,
+    StrideSettings,
 )
 
 _STEP = 1e-6
 
 
 def lifted_model(
-    robot: Robot, gait: Gait, settings: Settings, *, rotors: Rotors = NO_ROTORS
+    robot: Robot, gait: Gait, settings: StrideSettings, *, rotors: Rotors = NO_ROTORS
 ) -> LiftedModel:
     """Compute the lifted model of a gait: the first-order response to changes of the feedforward.
 
@@ -47,7 +47,7 @@ def lifted_model(
     return _Linearised(robot, gait, settings, rotors).lifted()
 
 
-class _Linearised(GuidedStrides):
+class _Linearised(PlanarStrides):
     """Strides of the planar model, and their linearisation."""
 
     def lifted(self) -> LiftedModel:
@@ -67,8 +67,8 @@ class _Linearised(GuidedStrides):
             rate=on_grid(by_input[:, rates]),
             angle_start=on_grid(by_state[:, joints]),
             rate_start=on_grid(by_state[:, rates]),
-            carry=to_touchdown @ by_state[-1],
-            push=to_touchdown @ by_input[-1],
+            A=to_touchdown @ by_state[-1],
+            B=to_touchdown @ by_input[-1],
             gains=self.settings.gains,
             torque=self.gait.stance.motion(self.robot, phase_grid()).tau,
         )

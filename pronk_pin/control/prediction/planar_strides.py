@@ -34,7 +34,7 @@ _HALF = 0.5
 """Phase of stance before which feet do not lift off, and of flight before which none lands."""
 
 
-class Settings(NamedTuple):
+class StrideSettings(NamedTuple):
     """Settings of a controller that shape its planar strides; see `ControllerSpec`.
 
     `share` is the part of the gait's torque that acts as feedforward on the orbit: 0 before
@@ -61,7 +61,7 @@ class PlayedPhase(NamedTuple):
     """Whether the feet stood on the ground, at each tick."""
 
 
-class GuidedStrides:
+class PlanarStrides:
     """Strides of the planar model under one controller.
 
     Args:
@@ -71,10 +71,10 @@ class GuidedStrides:
         rotors: Rotor inertia and friction of the joints beyond the URDF.
     """
 
-    def __init__(self, robot: Robot, gait: Gait, settings: Settings, rotors: Rotors) -> None:
+    def __init__(self, robot: Robot, gait: Gait, settings: StrideSettings, rotors: Rotors) -> None:
         as_robot(robot)
         instance_of("gait", gait, Gait)
-        instance_of("settings", settings, Settings)
+        instance_of("settings", settings, StrideSettings)
         instance_of("rotors", rotors, Rotors)
         self.robot, self.gait, self.settings, self.rotors = robot, gait, settings, rotors
         gains, dt = settings.gains, settings.timestep
@@ -82,7 +82,7 @@ class GuidedStrides:
         self.ticks = round(gait.stance.duration / dt)
         s = np.arange(self.ticks, dtype=np.float64) * (dt / gait.stance.duration)
         self.stance, self.stance_rate = gait.stance.joint_reference(s)
-        self.tell(settings.share * gait.stance.motion(robot, phase_grid()).tau)
+        self.set_feedforward(settings.share * gait.stance.motion(robot, phase_grid()).tau)
         longest = round(_LONGEST_FLIGHT * gait.flight.duration / dt)
         self.flight_phase = np.minimum(np.arange(longest) * dt / gait.flight.duration, 1.0)
         self.flight, self.flight_rate = gait.flight.joint_reference(self.flight_phase)
@@ -91,7 +91,7 @@ class GuidedStrides:
         self.share_rate = rate / gait.flight.duration
         self.lift_off_speed = gait.stance.base_reference(np.array([1.0]))[1][0, 0]
 
-    def tell(self, feedforward: Array) -> None:
+    def set_feedforward(self, feedforward: Array) -> None:
         """Set the feedforward of the stances from now on, (samples, 12) [N m]."""
         self.torque = self.at_ticks(feedforward)
 
@@ -136,13 +136,13 @@ class GuidedStrides:
             stance = self.play_stance(state)
             flight, landing = self.play_flight(stance.states[-1], stance.standing[-1])
             following = self.impact(landing)
-            missed = np.abs(following - state).max()
-            if missed < _SETTLED:
+            change = np.abs(following - state).max()
+            if change < _SETTLED:
                 return stance, flight, landing
             state = following
         raise InvalidInput(
             f"the model does not settle on an orbit at {self.gait.speed:g} m/s "
-            f"(it still changes by {missed:.2g}); choose other gains or another gait"
+            f"(it still changes by {change:.2g}); choose other gains or another gait"
         )
 
     def play_stance(self, state: Array) -> PlayedPhase:

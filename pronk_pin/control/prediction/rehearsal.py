@@ -14,10 +14,10 @@ from ..._typing import Array
 from ...errors import InvalidInput
 from ..learning import LearningLaw
 from ..signals import StrideRecord
-from .planar_strides import GuidedStrides
+from .planar_strides import PlanarStrides
 
 
-def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, number: int) -> Array:
+def rehearse(strides: PlanarStrides, law: LearningLaw, begin: StrideRecord, number: int) -> Array:
     """Predict the errors of the strides of learning by simulating them in the model [rad].
 
     The model's error in the stride before the learning is taken to stay as it is.
@@ -36,7 +36,7 @@ def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, numb
         InvalidInput: The model does not settle on an orbit with the feedforward of `begin`.
     """
     gains, record = strides.settings.gains, begin
-    strides.tell(begin.feedforward[0])
+    strides.set_feedforward(begin.feedforward[0])
     stance, _, landing = strides.orbit()
     error_offset, rate_offset = (
         recorded[0] - simulated
@@ -48,7 +48,7 @@ def rehearse(strides: GuidedStrides, law: LearningLaw, begin: StrideRecord, numb
     errors[0] = begin.error[0]
     for k in range(1, number + 1):
         feedforward = law.update(record)
-        strides.tell(feedforward[0])
+        strides.set_feedforward(feedforward[0])
         try:
             stance = strides.play_stance(strides.impact(landing))
             _, landing = strides.play_flight(stance.states[-1], stance.standing[-1])

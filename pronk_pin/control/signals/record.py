@@ -33,7 +33,7 @@ class PhaseLog:
         missing: Torque that the motors' limits cut off: delivered minus commanded [N m], shape
             (n, ticks, 12).
         length: Ticks that the phase lasted; later ones hold nothing of it, shape (n,).
-        felt: Tick at which its beginning was sensed: those before were played on the tape before.
+        sensed: Tick at which its beginning was sensed: those before were played on the tape before.
         load: Vertical force on all feet [N], shape (n, ticks); None without force sensors.
         pose: Estimated position and quaternion of the trunk, shape (n, ticks, 7); None where the
             trunk is level.
@@ -48,7 +48,7 @@ class PhaseLog:
     feedforward: Array
     missing: Array
     length: IntArray
-    felt: int = 0
+    sensed: int = 0
     load: Array | None = None
     pose: Array | None = None
     twist: Array | None = None
@@ -64,7 +64,7 @@ class PhaseLog:
         """
         last = self.length[:, None] - 1.0
         index = s * (last if ticks is None else ticks[:, None])
-        return np.asarray(np.clip(index, self.felt, last))
+        return np.asarray(np.clip(index, self.sensed, last))
 
 
 @dataclass(frozen=True)

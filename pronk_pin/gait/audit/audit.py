@@ -122,12 +122,12 @@ def _residual(solution: GaitSolution) -> tuple[Check, Check]:
     """Residual of eq. (2) of the whole robot: zero on the planar rows, which the planar constraint
     leaves free; on the others the constraint's forces."""
     robot, contact = solution.problem.robot, solution.problem.contact
-    rows, free, guide = planar_rows(robot, solution.problem.base), {}, {}
+    rows, free, constraint = planar_rows(robot, solution.problem.base), {}, {}
     for name, motion in solution.motions.items():
         missing = missing_forces(robot, motion, contact)
         free[name] = (motion, missing[:, rows])
-        guide[name] = (motion, np.delete(missing, rows, axis=1))
-    return _worst("18-DoF residual", free), _worst("guide", guide)
+        constraint[name] = (motion, np.delete(missing, rows, axis=1))
+    return _worst("18-DoF residual", free), _worst("guide", constraint)
 
 
 def _symmetry(solution: GaitSolution) -> Check:

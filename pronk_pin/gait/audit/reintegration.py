@@ -57,7 +57,7 @@ def drift(
         motion: The optimised motion at its nodes, midpoints included.
         contact: How feet stand on the ground.
         feet: The legs whose feet stand.
-        base: What the guide leaves the trunk.
+        base: What the planar constraint leaves the trunk.
     """
     rows = planar_rows(robot, base)
     n = len(rows)

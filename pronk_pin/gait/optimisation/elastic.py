@@ -64,7 +64,7 @@ NOTABLE = 0.02
 """Share of a demand's size below which it does not count as giving way."""
 
 
-def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] | None:
+def find_conflicts(program: Transcription, start: Array, p: Array) -> dict[str, float] | None:
     """Find the demands that conflict, and by how much each has to give way, the worst first.
 
     Args:
@@ -120,9 +120,9 @@ def fights(program: Transcription, start: Array, p: Array) -> dict[str, float] |
     return None
 
 
-def remedies(found: Mapping[str, float] | None) -> list[str]:
+def remedies(conflicts: Mapping[str, float] | None) -> list[str]:
     """What to try, each remedy once."""
-    advice = list(dict.fromkeys(DEMANDS[name][1] for name in found or ()))
+    advice = list(dict.fromkeys(DEMANDS[name][1] for name in conflicts or ()))
     names = [item for item in _ARGUMENTS if any(item in words for words in advice)]
     if names:
         advice[-1] += f" (in Python: {', '.join(names)} of build_library)"

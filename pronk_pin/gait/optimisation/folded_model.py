@@ -8,9 +8,9 @@ trunk held to the sagittal plane without rotation its coordinates are
 
 with the pitch after z where it is free (9), and its equations are the x, z, pitch and left-leg rows
 of the whole robot's: no quaternion, no redundant right side. The trunk's centre of mass is taken to
-lie in the mirror plane; what it lies beside it gives a roll moment, which the guide that keeps the
-trunk in the plane takes. Where the URDF's left and right legs differ, the folded leg is their mean,
-which leaves the motion exact: `asymmetry` says what each side needs besides.
+lie in the mirror plane; what it lies beside it gives a roll moment, which the planar constraint
+that keeps the trunk in the plane takes. Where the URDF's left and right legs differ, the folded leg
+is their mean, which leaves the motion exact: `asymmetry` says what each side needs besides.
 
 Everything is a CasADi SX expression, so that the solver gets exact derivatives.
 """

@@ -20,7 +20,7 @@ from ..gait import Gait, GaitPhase, Motion
 from ..problem import ContactPhase, GaitProblem
 from .ballistics import check_ballistics
 from .collocation import node_phases, transcribe
-from .elastic import fights, remedies
+from .elastic import find_conflicts, remedies
 from .folded_model import FoldedModel
 from .guess import vertical_hop
 from .transcription import Transcription, Violation
@@ -142,8 +142,8 @@ def optimize_gait(
     violations = program.violations(run.state.x, p)
     worst = {name: violation.value for name, violation in violations.items()}
     if not run.success or max(worst.values()) > TOLERANCE:
-        gives = _fights(problem) if diagnose else None
-        raise GaitNotFound(problem.speed, run.status, worst, gives, remedies(gives))
+        conflicts = _find_conflicts(problem) if diagnose else None
+        raise GaitNotFound(problem.speed, run.status, worst, conflicts, remedies(conflicts))
     return _solution(problem, run.state, run)
 
 
@@ -210,11 +210,11 @@ def _check_alike(initial: GaitProblem, problem: GaitProblem) -> None:
         )
 
 
-def _fights(problem: GaitProblem) -> dict[str, float] | None:
+def _find_conflicts(problem: GaitProblem) -> dict[str, float] | None:
     """Find the conflicting demands, on a coarse mesh, which is enough to tell."""
     coarse = problem.remeshed([_COARSE] * len(problem.sequence))
     program = _program(coarse)
-    return fights(program, program.pack(vertical_hop(coarse)), _parameters(problem))
+    return find_conflicts(program, program.pack(vertical_hop(coarse)), _parameters(problem))
 
 
 class _Found(NamedTuple):

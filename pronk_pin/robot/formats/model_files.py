@@ -18,7 +18,7 @@ _COULOMB_TIME = 0.002
 """Time constant of MuJoCo's joint friction [s]; its default of 0.02 s makes it a damper."""
 
 
-def mended_spec(robot: Robot) -> mujoco.MjSpec:
+def parametrised_spec(robot: Robot) -> mujoco.MjSpec:
     """`mujoco_spec` with the robot's parameters, and a torque motor at every joint."""
     spec = mujoco_spec(robot)
     set_body_inertia(spec.body(robot.spec.base_link), robot.model.inertias[1])
@@ -52,7 +52,7 @@ def write_mjcf(robot: Robot, path: Path | str, notes: Sequence[str] = ()) -> Pat
     Raises:
         FileProblem: The file cannot be written.
     """
-    spec = mended_spec(robot)
+    spec = parametrised_spec(robot)
     spec.compile()
     return _write(path, spec.to_xml(), notes)
 

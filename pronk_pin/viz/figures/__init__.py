@@ -18,18 +18,18 @@ from .figures import (
 from .gait_figures import write_gait_figures
 from .learning_figures import errors_by_seed, predicted_and_measured
 from .skill_figures import gains_figure, transfers_figure
-from .suite_figures import by_world, heat_map, practice_curves
+from .suite_figures import by_scenario, heat_map, peak_curves
 
 __all__ = [
     "LABELS",
-    "by_world",
+    "by_scenario",
     "errors_by_seed",
     "errors_by_speed",
     "gains_figure",
     "heat_map",
     "learned_minus_model",
     "learning_curves",
-    "practice_curves",
+    "peak_curves",
     "predicted_and_measured",
     "stayed_up",
     "torque_library",

@@ -1,4 +1,4 @@
-"""Figures of what a learned skill is good for: smaller gains, and other tasks."""
+"""Figures of what learned feedforward is good for: smaller gains, and other tasks."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ def gains_figure(table: pd.DataFrame) -> Figure:
 
 @styled
 def transfers_figure(table: pd.DataFrame) -> Figure:
-    """Peak error of the stored skill in each task beside practice there, and the rule's answer.
+    """Peak error of the stored feedforward in each task beside learning there, and the rule's
+    answer.
 
     Args:
         table: What `compare.transfer.measure_transfers` returns.
@@ -55,20 +56,20 @@ def transfers_figure(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(1, 2, sharey=True)
     place = np.arange(len(table))
     for axes, joint in zip(panels, SHOWN, strict=True):
-        relearned = table[f"{joint}_practised"].to_numpy()
+        relearned = table[f"{joint}_relearned"].to_numpy()
         for row, (stored, relearned_peak) in enumerate(zip(table[joint], relearned, strict=True)):
             axes.plot([relearned_peak, stored], [row, row], color="0.75", lw=1.5, zorder=1)
-        axes.plot(relearned, place, **_points("ilc", "practised there"))
+        axes.plot(relearned, place, **_points("ilc", "learned there"))
         for reuse, label in (
-            (True, "stored skill: reuse"),
-            (False, "stored skill: practise again"),
+            (True, "stored feedforward: reuse"),
+            (False, "stored feedforward: learn again"),
         ):
             chosen = (table["reuse"] == reuse).to_numpy()
             color = PALETTE["green"] if reuse else ACCENT
             style = {**_points("library", label), "color": color, "marker": "D" if reuse else "s"}
             axes.plot(table[joint][chosen], place[chosen], **style)
         limit = (1.0 + TOLERANCE) * relearned
-        axes.plot(limit, place, "|", color="k", ms=8, label=f"{TOLERANCE:.0%} above practice")
+        axes.plot(limit, place, "|", color="k", ms=8, label=f"{TOLERANCE:.0%} above learning")
         axes.set_xscale("log")
         low, high = axes.get_xlim()
         shown = [tick for tick in _TICKS if low <= tick <= high]

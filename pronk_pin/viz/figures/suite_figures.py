@@ -1,4 +1,4 @@
-"""Figures over many worlds: who has which error where, and when practice beats the model."""
+"""Figures over many scenarios: who has which error where, and when practice beats the model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ...compare.metrics import RIVAL, Practice
+from ...compare.metrics import RIVAL, PeakHistory
 from ...compare.report import SHOWN
 from ..figure_style import (
     SEQUENTIAL,
@@ -32,7 +32,7 @@ _COLUMNS = 3
 
 @styled
 def heat_map(table: pd.DataFrame) -> Figure:
-    """Mean peak error of every controller in every world, one panel a joint.
+    """Mean peak error of every controller in every scenario, one panel a joint.
 
     Args:
         table: `compare.tables.answer`. Where robots fell, their number stands below the error, or
@@ -82,13 +82,13 @@ def _why_empty(row: pd.Series) -> str:
 
 
 @styled
-def practice_curves(histories: Mapping[str, list[Practice]], *, joint: str) -> Figure:
-    """Peak error over the strides of learning in every world, with the model's level as a line.
+def peak_curves(histories: Mapping[str, list[PeakHistory]], *, joint: str) -> Figure:
+    """Peak error over the strides of learning in every scenario, with the model's level as a line.
 
     Means over the robots that did not fall; the band is from the first to the third quartile.
 
     Args:
-        histories: The simulations of each world.
+        histories: The simulations of each scenario.
         joint: "calf" or "thigh".
     """
     rows = -(-len(histories) // _COLUMNS)
@@ -120,11 +120,11 @@ def practice_curves(histories: Mapping[str, list[Practice]], *, joint: str) -> F
 
 
 @styled
-def by_world(table: pd.DataFrame) -> Figure:
-    """Mean peak error in each sampled world, one line a world and one panel a joint.
+def by_scenario(table: pd.DataFrame) -> Figure:
+    """Mean peak error in each sampled scenario, one line a world and one panel a joint.
 
     Args:
-        table: `compare.tables.sampled_worlds`.
+        table: `compare.tables.sampled_scenarios`.
     """
     controllers = in_order(table["calf"].columns)
     figure = new_figure(TWO_COLUMNS, 0.9 + 0.14 * len(table))
@@ -148,7 +148,7 @@ def by_world(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, simulations: list[Practice], joint: int, controller: str) -> object:
+def _draw(axes: Axes, simulations: list[PeakHistory], joint: int, controller: str) -> object:
     """One controller: a curve if it learns, a level if it is PD or the model."""
     style = look(controller)
     upright = [history.upright == 1 for history in simulations]

@@ -1,6 +1,6 @@
 """The page that plays scenes: live, in one file, in a browser without a window.
 
-Comes in: a `Scene` or a `Programme`.
+Comes in: a `Scene` or a `Menu`.
 Goes out: a served page, a replay, a picture, a film.
 """
 

@@ -37,7 +37,7 @@ _FLAGS = (
     *("--disable-sync", "--disable-quic"),
 )
 
-_PATIENCE = 60.0
+_TIMEOUT = 60.0
 """Timeout of an answer [s]."""
 
 
@@ -118,7 +118,7 @@ class Browser:
             os.write(self._to, json.dumps(message).encode() + b"\0")
         except OSError:
             raise self._gone() from None
-        end = time.monotonic() + _PATIENCE
+        end = time.monotonic() + _TIMEOUT
         while True:
             answer = self._read(end, method)
             if answer.get("id") == self._count:
@@ -152,7 +152,7 @@ class Browser:
         Raises:
             NoBrowser: It never does.
         """
-        end = time.monotonic() + _PATIENCE
+        end = time.monotonic() + _TIMEOUT
         while not self.run(condition):
             if time.monotonic() > end:
                 raise NoBrowser(f"its page never gets so far as '{condition}': {self.errors}")
@@ -198,7 +198,7 @@ class Browser:
         while b"\0" not in self._buffer:
             ready, _, _ = select.select([self._from], [], [], max(end - time.monotonic(), 0.0))
             if not ready:
-                raise NoBrowser(f"it does not answer to {method} within {_PATIENCE:g} s")
+                raise NoBrowser(f"it does not answer to {method} within {_TIMEOUT:g} s")
             data = os.read(self._from, 1 << 20)
             if not data:
                 raise self._gone()

@@ -38,7 +38,7 @@ from tornado.httputil import HTTPServerRequest
 from ..._checks import Interval, none_or, real, shown, text, whole
 from ...errors import InvalidInput, PortUnavailable, PronkError
 from ...robot import as_array, as_q
-from ..scenes import CHANNELS, Programme, Scene
+from ..scenes import CHANNELS, Menu, Scene
 from .hosts import Hosts, url_of
 from .page import page, player_source, viewer_source
 from .scene_encoding import film_blob, robot_blob, row_bytes, stream_row
@@ -81,7 +81,7 @@ DURATION = Interval(0, 1e6, "s", above=True)
 
 
 def serve(
-    shown: Scene | Programme,
+    shown: Scene | Menu,
     *,
     port: int | None = None,
     host: str = "127.0.0.1",
@@ -123,17 +123,17 @@ class LiveServer:
     shows the page.
 
     Attributes:
-        programme: What can be shown.
+        menu: What can be shown.
         scene: What is shown first, and what `display` moves.
         url: Address of the page.
         hosts: What it answers to.
     """
 
     def __init__(
-        self, shown: Scene | Programme, *, port: int | None = None, host: str = "127.0.0.1"
+        self, shown: Scene | Menu, *, port: int | None = None, host: str = "127.0.0.1"
     ) -> None:
-        self.programme = Programme.of(shown)
-        self.scene = self.programme.scene()
+        self.menu = Menu.of(shown)
+        self.scene = self.menu.scene()
         self._robot = robot_blob(self.scene)
         self._sockets = _bind(host, port)
         self.hosts = Hosts.of(host, self._sockets)
@@ -190,14 +190,14 @@ class LiveServer:
         if len(q) != len(tracks):
             raise InvalidInput(f"{len(q)} configurations for {len(tracks)} tracks; give one each")
         rows: list[dict[str, npt.NDArray[np.float64]]] = []
-        given = {key: iter(values) for key, values in channels.items()}
-        if unknown := set(given) - set(CHANNELS):
+        values_by_channel = {key: iter(values) for key, values in channels.items()}
+        if unknown := set(values_by_channel) - set(CHANNELS):
             raise InvalidInput(f"no channel {', '.join(unknown)}; there are {', '.join(CHANNELS)}")
-        for track, one in zip(tracks, q, strict=True):
-            place = as_q(robot, one).reshape(1, -1)
+        for track, configuration in zip(tracks, q, strict=True):
+            place = as_q(robot, configuration).reshape(1, -1)
             row = {"q": place, "feet": self.scene.appearance.feet(place).reshape(1, -1)}
             for key in track.channels:
-                values = next(given.get(key, iter(())), None)
+                values = next(values_by_channel.get(key, iter(())), None)
                 if values is None:
                     raise InvalidInput(f"track '{track.name}' shows {key}; give {key}=[...]")
                 size = getattr(track, key).reshape(len(track.t), -1).shape[1]
@@ -237,9 +237,9 @@ class LiveServer:
         self._loop.close()
 
     def _application(self) -> tornado.web.Application:
-        options = {name: list(values) for name, values in self.programme.options.items()}
+        options = {name: list(values) for name, values in self.menu.options.items()}
         start = Template(_START).substitute(
-            options=_json(options), first=_json(dict(self.programme.first))
+            options=_json(options), first=_json(dict(self.menu.first))
         )
         script = "text/javascript; charset=utf-8"
         served: list[tuple[str, type[tornado.web.RequestHandler], dict[str, Any]]] = [
@@ -258,8 +258,8 @@ class LiveServer:
         return await loop.run_in_executor(self._worker, self._film, choice)
 
     def _film(self, choice: dict[str, str]) -> bytes:
-        first = choice == dict(self.programme.first)
-        return film_blob(self.scene if first else self.programme.scene(choice))
+        first = choice == dict(self.menu.first)
+        return film_blob(self.scene if first else self.menu.scene(choice))
 
 
 class _Application(tornado.web.Application):

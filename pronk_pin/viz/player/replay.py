@@ -12,7 +12,7 @@ from ..._checks import path as known_path
 from ..._checks import real
 from ...errors import InvalidInput
 from ...storage import write_file
-from ..scenes import Choice, Programme, Scene
+from ..scenes import Choice, Menu, Scene
 from .page import page, player_source, viewer_source
 from .scene_encoding import FPS, film_blob, robot_blob
 
@@ -36,10 +36,10 @@ _START = """\
 """
 
 
-def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS) -> Path:
+def write_replay(shown: Scene | Menu, path: Path | str, *, fps: float = FPS) -> Path:
     """Write a scene, or several to choose from, as one HTML file that plays at once and repeats.
 
-    Of a programme the file holds `Programme.choices`, as far as it stays below `LARGEST`; without
+    Of a menu the file holds `Menu.choices`, as far as it stays below `LARGEST`; without
     those of which there is nothing to show.
 
     The page has the controls of the live page; with `#t=0.35` behind its address it opens paused
@@ -61,11 +61,11 @@ def write_replay(shown: Scene | Programme, path: Path | str, *, fps: float = FPS
     return write_file(path, replay_html(shown, fps=fps), remedy="choose another path")
 
 
-def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
+def replay_html(shown: Scene | Menu, *, fps: float = FPS) -> str:
     """The text of the file that `write_replay` writes."""
     if not 0.0 < real("fps", fps) <= 1000.0:
         raise InvalidInput(f"fps must be positive, not {fps}; and 1000 at most")
-    menu = Programme.of(shown)
+    menu = Menu.of(shown)
     first = menu.scene()
     frame = page(
         first.title,
@@ -97,8 +97,8 @@ def replay_html(shown: Scene | Programme, *, fps: float = FPS) -> str:
     return frame.replace("$start", start, 1)
 
 
-def _options(menu: Programme, held: Sequence[Choice]) -> dict[str, list[str]]:
-    """The values of each option that the file holds, in the programme's order."""
+def _options(menu: Menu, held: Sequence[Choice]) -> dict[str, list[str]]:
+    """The values of each option that the file holds, in the menu's order."""
     return {
         name: [value for value in values if any(choice[name] == value for choice in held)]
         for name, values in menu.options.items()

@@ -48,11 +48,13 @@ def show(
         InvalidInput: q or the forces are of another shape.
         PortUnavailable: The port is in use or forbidden.
     """
-    one = as_q(robot, q)
-    if one.ndim != 1:
-        raise InvalidInput(f"q has shape {one.shape}; show one posture, and play a motion")
+    configuration = as_q(robot, q)
+    if configuration.ndim != 1:
+        raise InvalidInput(
+            f"q has shape {configuration.shape}; show one posture, and play a motion"
+        )
     lam = None if forces is None else as_numbers("forces", forces)[None]
-    track = Track(robot.name, np.zeros(1), one[None], forces=lam)
+    track = Track(robot.name, np.zeros(1), configuration[None], forces=lam)
     scene = Scene(robot, (track,), title=title or robot.name.upper(), friction=friction)
     return _page(scene, port, open_browser)
 

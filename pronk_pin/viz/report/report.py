@@ -21,9 +21,9 @@ from ...compare.metrics import (
     LEARNER,
     LEAST_UNITS,
     VARIABLES,
-    Practice,
+    PeakHistory,
     family,
-    practice,
+    peak_history,
     sampled,
 )
 from ...compare.report import (
@@ -34,7 +34,7 @@ from ...compare.report import (
     beside_the_paper,
     families,
     limitations,
-    sampled_worlds,
+    sampled_scenarios,
     units_of_intervals,
     verdict,
 )
@@ -58,15 +58,15 @@ _CAPTIONS = {
     "torques": "Torque library: the learned feedforward, averaged over the last 30 strides "
     "(the paper's Fig. 4).",
     "surface": "The same torques over speed and phase.",
-    "by-world": "Mean peak stance error in each sampled world, from the one in which practice "
+    "by-world": "Mean peak stance error in each sampled scenario, from the one in which learning "
     "leaves the least of the calf's error to the one with the most.",
-    "difference": "What practice adds to the model: learned minus the model's feedforward torque.",
+    "difference": "What learning adds to the model: learned minus the model's feedforward torque.",
 }
 
 _READING = (
     "Errors are peaks of the joint angle's error in stance, means over legs, the last 30 strides "
     f"and the robots that did not fall. Intervals hold {CONFIDENCE:.0%} (BCa bootstrap). The unit "
-    "that is drawn is the sampled world, or the seed in a world that is not sampled, or the speed "
+    "that is drawn is the sampled scenario, or the seed in one that is not sampled, or the speed "
     f"where there are fewer than {LEAST_UNITS} of them. A controller is better or worse than the "
     "model where the interval of the paired difference excludes 0, else the matter is open. Wins, "
     "or the probability of improvement, are the share of the robots whose error is smaller than "
@@ -99,14 +99,14 @@ def write_report(results: Results) -> Path:
 
 def report(results: Results) -> Document:
     """The report as a document."""
-    summary, worlds = results.summary(), families(results.experiment.scenarios)
+    summary, scenarios = results.summary(), families(results.experiment.scenarios)
     document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
     table = answer(summary)
     document.text(answer_in_words(summary, table=table), "verdict")
-    if len(worlds) > 1:
-        _all_worlds(document, results, table)
-    for world in worlds:
-        _world(document, results, summary, table, world)
+    if len(scenarios) > 1:
+        _all_scenarios(document, results, table)
+    for scenario in scenarios:
+        _world(document, results, summary, table, scenario)
     if results.foreign is not None:
         _foreign_robot(document, results.foreign)
     document.heading("How to read the numbers", "statistics")
@@ -129,11 +129,11 @@ def command(results: Results) -> str:
     words += ["--scenarios " + " ".join(experiment.scenarios)]
     words += ["--seeds " + " ".join(map(str, experiment.seeds))]
     words += [f"--base {experiment.base}"]
-    words += [f"--world {shlex.quote(experiment.world)}"] if experiment.world else []
+    words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []
     schedule = experiment.schedule
     words += [
         f"--schedule.{name} {getattr(schedule, name):g}"
-        for name in ("startup", "practice", "learning", "scatter")
+        for name in ("startup", "baseline", "learning", "scatter")
     ]
     return " ".join(words)
 
@@ -147,20 +147,20 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
     strides = {
         name: results.all_strides(controller=name, scenario=scenario) for name in controllers
     }
-    found = {
+    figures_by_name = {
         "errors": figures.errors_by_speed(results.summary(), scenario=scenario),
         "learning": figures.learning_curves(strides),
     }
     learned = _learned(strides[LEARNER]) if LEARNER in strides else None
     if learned is not None and learned.sizes["speed"]:
         speed = min(learned["speed"].to_numpy(), key=lambda v: abs(v - SHOWN_SPEED))
-        found["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
-        found["torques"] = figures.torque_library(learned)
-        found["surface"] = figures.torque_surface(learned)
+        figures_by_name["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
+        figures_by_name["torques"] = figures.torque_library(learned)
+        figures_by_name["surface"] = figures.torque_surface(learned)
         model = figures.stayed_up(strides["model"]) if "model" in strides else None
         if model is not None and set(model["speed"].values) & set(learned["speed"].values):
-            found["difference"] = figures.learned_minus_model(learned, model)
-    return found
+            figures_by_name["difference"] = figures.learned_minus_model(learned, model)
+    return figures_by_name
 
 
 def _learned(strides: xr.Dataset) -> xr.Dataset:
@@ -175,26 +175,26 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     Raises:
         FileProblem: The folder cannot be written, or the result is damaged.
     """
-    found = scenario_figures(results, results.experiment.scenarios[0])
+    figures_by_name = scenario_figures(results, results.experiment.scenarios[0])
     if len(families(results.experiment.scenarios)) > 1:
-        found |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
+        figures_by_name |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
     for world in filter(sampled, families(results.experiment.scenarios)):
-        table = sampled_worlds(results.summary(), scenario=world)
-        found[f"{world}-by-world"] = figures.by_world(table)
+        table = sampled_scenarios(results.summary(), scenario=world)
+        figures_by_name[f"{world}-by-world"] = figures.by_scenario(table)
     return [
         save_figure(figure, folder / f"{name}.{suffix}")
-        for name, figure in found.items()
+        for name, figure in figures_by_name.items()
         for suffix in ("svg", "pdf")
     ]
 
 
-def _all_worlds(document: Document, results: Results, table: pd.DataFrame) -> None:
-    """What comes out over all worlds: a row a world, the heat map, and the learning."""
-    document.heading("All worlds", "worlds")
+def _all_scenarios(document: Document, results: Results, table: pd.DataFrame) -> None:
+    """What comes out over all scenarios: a row a scenario, the heat map, and the learning."""
+    document.heading("All scenarios", "scenarios")
     controllers = set(table.index.get_level_values("controller"))
     if LEARNER in controllers:
-        document.text("A row a world: peak error under practice (ILC) beside PD and the model.")
-        document.table(report_tables.by_world(table))
+        document.text("a row a scenario: peak error under learning (ILC) beside PD and the model.")
+        document.table(report_tables.by_scenario(table))
     for name, (figure, caption) in _suite_figures(results, table).items():
         document.picture(name, figure, caption)
 
@@ -202,27 +202,27 @@ def _all_worlds(document: Document, results: Results, table: pd.DataFrame) -> No
 def _suite_figures(
     results: Results, table: pd.DataFrame | None = None
 ) -> dict[str, tuple[Figure, str]]:
-    """Figures over all worlds with their captions."""
+    """Figures over all scenarios with their captions."""
     table = answer(results.summary()) if table is None else table
     return {
         "heat-map": (
             figures.heat_map(table),
-            "Mean peak stance error by world and controller, in milliradians.",
+            "Mean peak stance error by scenario and controller, in milliradians.",
         ),
-        **_practice_figures(results),
+        **_learning_figures(results),
     }
 
 
-def _practice_figures(results: Results) -> dict[str, tuple[Figure, str]]:
-    """Practice over its strides in every world, with captions."""
-    practised: dict[str, list[Practice]] = {}
+def _learning_figures(results: Results) -> dict[str, tuple[Figure, str]]:
+    """Learning over its strides in every scenario, with captions."""
+    histories: dict[str, list[PeakHistory]] = {}
     for cell in results.experiment.cells():
-        one = practice(results.strides(cell, VARIABLES))
-        practised.setdefault(family(cell.scenario), []).append(one)
-    ordered = {name: practised[name] for name in families(results.experiment.scenarios)}
+        history = peak_history(results.strides(cell, VARIABLES))
+        histories.setdefault(family(cell.scenario), []).append(history)
+    ordered = {name: histories[name] for name in families(results.experiment.scenarios)}
     return {
-        f"practice-{joint}": (
-            figures.practice_curves(ordered, joint=joint),
+        f"learning-{joint}": (
+            figures.peak_curves(ordered, joint=joint),
             f"The {joint}'s peak error over the strides of learning, with the levels of PD "
             "and of the model's feedforward; bands from the first to the third quartile.",
         )
@@ -231,33 +231,33 @@ def _practice_figures(results: Results) -> dict[str, tuple[Figure, str]]:
 
 
 def _world(
-    document: Document, results: Results, summary: pd.DataFrame, table: pd.DataFrame, world: str
+    document: Document, results: Results, summary: pd.DataFrame, table: pd.DataFrame, scenario: str
 ) -> None:
-    """The section about one world; the first one has all figures."""
-    worlds = families(results.experiment.scenarios)
-    drawn = [name for name in results.experiment.scenarios if family(name) == world]
-    where = f"{len(drawn)} sampled worlds" if sampled(world) else "world"
-    document.heading(f'Controllers in the {where} "{world}"', world)
-    if len(worlds) > 1:
-        document.text(verdict(summary, scenario=world, table=table.loc[world]))
-    document.table(report_tables.errors(table.loc[world]))
-    document.table(report_tables.motion(table.loc[world]))
-    units = units_of_intervals(table.loc[world])
+    """The section about one scenario; the first one has all figures."""
+    scenarios = families(results.experiment.scenarios)
+    drawn = [name for name in results.experiment.scenarios if family(name) == scenario]
+    where = f"{len(drawn)} sampled scenarios" if sampled(scenario) else "scenario"
+    document.heading(f'Controllers in the {where} "{scenario}"', scenario)
+    if len(scenarios) > 1:
+        document.text(verdict(summary, scenario=scenario, table=table.loc[scenario]))
+    document.table(report_tables.errors(table.loc[scenario]))
+    document.table(report_tables.motion(table.loc[scenario]))
+    units = units_of_intervals(table.loc[scenario])
     document.text(f"Intervals are drawn over the {units}." if units else "", "note")
-    if sampled(world):
-        _sampled(document, results, summary, world)
-    if world != worlds[0] or world not in results.experiment.scenarios:
+    if sampled(scenario):
+        _sampled(document, results, summary, scenario)
+    if scenario != scenarios[0] or scenario not in results.experiment.scenarios:
         return
-    found = scenario_figures(results, world)
+    found = scenario_figures(results, scenario)
     document.picture("errors", found["errors"], _CAPTIONS["errors"])
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
     if {"pd", LEARNER} <= set(results.experiment.controllers):
-        document.heading("Table I, beside the paper's", f"{world}-table", level=3)
-        _beside(document, beside_the_paper(summary, scenario=world), table.loc[world])
+        document.heading("Table I, beside the paper's", f"{scenario}-table", level=3)
+        _beside(document, beside_the_paper(summary, scenario=scenario), table.loc[scenario])
     if LEARNER in results.experiment.controllers:
-        document.heading("Before and after, and what was learned", f"{world}-learned", level=3)
+        document.heading("Before and after, and what was learned", f"{scenario}-learned", level=3)
         if "tracking" not in found:
-            document.text("Nothing to show: no robot stayed up that practice taught something.")
+            document.text("Nothing to show: no robot stayed up that learning taught something.")
         for name in ("tracking", "torques", "surface", "difference"):
             if name in found:
                 document.picture(name, found[name], _CAPTIONS[name])
@@ -314,19 +314,19 @@ def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
         )
 
 
-def _sampled(document: Document, results: Results, summary: pd.DataFrame, world: str) -> None:
+def _sampled(document: Document, results: Results, summary: pd.DataFrame, scenario: str) -> None:
     """What the worlds of a family are like, and what comes out in each."""
-    table = sampled_worlds(summary, scenario=world)
-    document.heading("World by world", f"{world}-each", level=3)
-    document.picture(f"{world}-by-world", figures.by_world(table), _CAPTIONS["by-world"])
+    table = sampled_scenarios(summary, scenario=scenario)
+    document.heading("Scenario by scenario", f"{scenario}-each", level=3)
+    document.picture(f"{scenario}-by-world", figures.by_scenario(table), _CAPTIONS["by-world"])
     document.text(
-        "What is drawn of each world, and the mean peaks in it in milliradians, over the robots "
+        "What is drawn of each scenario, and the mean peaks in it in milliradians, over the robots "
         "that did not fall; in the order of the figure."
     )
-    document.table(report_tables.each_world(table))
+    document.table(report_tables.each_scenario(table))
     if len(families(results.experiment.scenarios)) > 1:
-        return  # practice has its figures for all worlds
-    for name, (figure, caption) in _practice_figures(results).items():
+        return  # learning has its figures for all scenarios
+    for name, (figure, caption) in _learning_figures(results).items():
         document.picture(name, figure, caption)
 
 

@@ -8,13 +8,13 @@ from typing import Any
 import pandas as pd
 
 from ...compare.metrics import LEARNER, RIVAL
-from ...compare.report import SHOWN, WORLD, against_model, beat_text, between, number
+from ...compare.report import SHOWN, SHOWN_PARAMETERS, against_model, beat_text, between, number
 from ...parity import Parity, Row, format_value, merged
 from ..figure_style import in_order
 from ..figures import LABELS
 
 
-def by_world(table: pd.DataFrame) -> pd.DataFrame:
+def by_scenario(table: pd.DataFrame) -> pd.DataFrame:
     """One row a world about `ilc`, beside `pd` and `model`, from the table of `answer`."""
     rows = {}
     for world, row in table.xs(LEARNER, level="controller").iterrows():
@@ -72,11 +72,11 @@ def differing(differences: Sequence[Row]) -> pd.DataFrame:
     return pd.DataFrame(cells, index=index)
 
 
-def each_world(table: pd.DataFrame) -> pd.DataFrame:
-    """The table of `sampled_worlds` as texts."""
+def each_scenario(table: pd.DataFrame) -> pd.DataFrame:
+    """The table of `sampled_scenarios` as texts."""
     shown = {}
-    for attribute, (label, factor, form) in WORLD.items():
-        shown[label] = [number(factor * value, form) for value in table["world", attribute]]
+    for attribute, (label, factor, form) in SHOWN_PARAMETERS.items():
+        shown[label] = [number(factor * value, form) for value in table["scenario", attribute]]
     for joint in SHOWN:
         for controller in in_order(table[joint].columns):
             label = f"{joint}: {LABELS.get(controller, controller)}"

@@ -1,14 +1,14 @@
 """What is shown: robots that move, their marks, and the menu of what can be chosen.
 
 Comes in: motions, gaits, strides.
-Goes out: a `Scene`, or a `Programme` of scenes.
+Goes out: a `Scene`, or a `Menu` of scenes.
 """
 
-from .gait_scenes import gait_scene, library_programme, nearest
-from .menu import Choice, Programme
+from .gait_scenes import gait_scene, library_menu, nearest
+from .menu import Choice, Menu
 from .meshes import Mesh
 from .scene import CHANNELS, GHOST_COLOR, SECOND_COLOR, Color, Mark, Scene, Track
-from .stride_scenes import practice_programme
+from .stride_scenes import result_menu
 
 __all__ = [
     "CHANNELS",
@@ -17,12 +17,12 @@ __all__ = [
     "Choice",
     "Color",
     "Mark",
+    "Menu",
     "Mesh",
-    "Programme",
     "Scene",
     "Track",
     "gait_scene",
-    "library_programme",
+    "library_menu",
     "nearest",
-    "practice_programme",
+    "result_menu",
 ]

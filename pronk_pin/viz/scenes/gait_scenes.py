@@ -10,7 +10,7 @@ from ..._checks import Interval, instance_of, none_or, real, whole
 from ...errors import InvalidInput
 from ...gait import Gait, GaitLibrary
 from ...robot import Robot, as_robot, load_robot
-from .menu import Choice, Programme
+from .menu import Choice, Menu
 from .scene import Mark, Scene, Track
 
 SHOWN_SPEED = 0.5
@@ -71,13 +71,13 @@ def gait_scene(
     return Scene(robot, (track,), title=title, caption=caption, friction=friction)
 
 
-def library_programme(
+def library_menu(
     library: GaitLibrary,
     *,
     speed: float | None = None,
     apex: float | None = None,
     robot: Robot | None = None,
-) -> Programme:
+) -> Menu:
     """The gaits of a library, to choose from by speed and apex.
 
     Args:
@@ -110,7 +110,7 @@ def library_programme(
         "apex [m]": numbers([*library.apexes, apex]),
     }
     first = {"speed [m/s]": f"{speed:g}", "apex [m]": f"{apex:g}"}
-    return Programme(make, options, first, options)
+    return Menu(make, options, first, options)
 
 
 def numbers(values: Sequence[float]) -> list[str]:

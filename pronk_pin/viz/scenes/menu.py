@@ -15,30 +15,30 @@ Choice = Mapping[str, str]
 
 
 @dataclass(frozen=True, eq=False)
-class Programme:
+class Menu:
     """Scenes of one robot, to choose from.
 
     Attributes:
         make: Makes the scene of a choice.
         options: The values of each option, as the page lists them.
         first: The choice that is shown first.
-        filed: Options, the most important one first, whose values listed here a file holds too.
+        embedded: Options, the most important one first, whose values listed here a file holds too.
     """
 
     make: Callable[[Choice], Scene]
     options: Mapping[str, Sequence[str]] = field(default_factory=dict)
     first: Choice = field(default_factory=dict)
-    filed: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    embedded: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.check(self.first)
 
     @classmethod
-    def of(cls, shown: Scene | Programme) -> Programme:
-        """A programme as it is, a scene as a programme without choice."""
-        if isinstance(shown, Programme):
+    def of(cls, shown: Scene | Menu) -> Menu:
+        """A menu as it is, a scene as a menu without choice."""
+        if isinstance(shown, Menu):
             return shown
-        scene = instance_of("shown", shown, Scene, "a Scene or a Programme")
+        scene = instance_of("shown", shown, Scene, "a Scene or a Menu")
         return cls(lambda choice: scene)
 
     def check(self, choice: Choice) -> None:
@@ -69,7 +69,7 @@ class Programme:
     def choices(self) -> Iterator[Choice]:
         """Choices that a file embeds: the first, all values of one option, of two, and so on."""
         yield self.first
-        names = list(self.filed)
+        names = list(self.embedded)
         for count, last in enumerate(names, start=1):
             for values in product(*(self._values(name) for name in names[:count])):
                 if values[-1] != self.first[last]:  # the others came before
@@ -78,4 +78,4 @@ class Programme:
     def _values(self, name: str) -> list[str]:
         """The values of an option that a file holds, the first choice's first."""
         first = self.first[name]
-        return [first, *(value for value in self.filed[name] if value != first)]
+        return [first, *(value for value in self.embedded[name] if value != first)]

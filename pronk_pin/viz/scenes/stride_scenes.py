@@ -17,7 +17,7 @@ from ...gait import Gait, load_library
 from ...robot import Robot, load_robot
 from ..figure_style import look
 from .gait_scenes import SHOWN_SPEED, nearest, numbers
-from .menu import Choice, Programme
+from .menu import Choice, Menu
 from .scene import SECOND_COLOR, Mark, Scene, Track
 
 BEFORE, AFTER = 3, 9
@@ -40,7 +40,7 @@ BESIDE, STRIDES = "beside it", "strides"
 """The options of the page, in their order."""
 
 
-def practice_programme(
+def result_menu(
     results: Results,
     *,
     speed: float | None = None,
@@ -48,7 +48,7 @@ def practice_programme(
     scenario: str | None = None,
     beside: str | None = None,
     stride: int | None = None,
-) -> Programme:
+) -> Menu:
     """The robots of a result, to choose from by speed, controller, scenario and strides.
 
     Args:
@@ -94,7 +94,7 @@ def practice_programme(
     filed = {STRIDES: windows[:2], SPEED: options[SPEED], BESIDE: [ALONE, EARLIER]}
     if START not in windows:
         filed = {SPEED: options[SPEED]}
-    return Programme(reader.scene, options, first, filed)
+    return Menu(reader.scene, options, first, filed)
 
 
 @dataclass(frozen=True)

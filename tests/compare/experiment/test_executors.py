@@ -27,7 +27,7 @@ EXPERIMENT = Experiment(
     speeds=(0.0, 0.4),
     controllers=("pd", "ilc", "library"),
     seeds=(0, 3),
-    schedule=Schedule(startup=0.1, practice=1.0, learning=1.0),
+    schedule=Schedule(startup=0.1, baseline=1.0, learning=1.0),
 )
 COMMAND = """
 import sys
@@ -246,7 +246,7 @@ def test_what_is_no_address_of_a_scheduler_is_refused(address: str) -> None:
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("pronk_pin.compare.experiment.executors._PATIENCE", 0.5)
+    monkeypatch.setattr("pronk_pin.compare.experiment.executors._TIMEOUT", 0.5)
     with (
         pytest.raises(
             ExecutorUnavailable,

@@ -23,7 +23,7 @@ from pronk_pin.gait import SPEEDS
 from pronk_pin.robot import Robot
 from pronk_pin.robot.formats.urdf import mujoco_spec
 
-SHORT = Schedule(startup=0.1, practice=1.0, learning=0.5)
+SHORT = Schedule(startup=0.1, baseline=1.0, learning=0.5)
 
 
 def test_the_default_is_the_papers_speeds_under_five_controllers() -> None:
@@ -40,9 +40,9 @@ def test_what_the_library_replays_is_learned_before() -> None:
     )
     done: list[object] = []
     for cell in experiment.cells():
-        assert cell.practised is None or cell.practised in done
+        assert cell.depends_on is None or cell.depends_on in done
         done.append(cell)
-    # Learning was not asked for, but each world and seed needs it.
+    # Learning was not asked for, but each scenario and seed needs it.
     assert len(done) == len(set(done)) == 3 * 2 * 2
 
 
@@ -66,10 +66,10 @@ def test_the_same_robot_from_an_mjcf_makes_the_same_strides(robot: Robot, tmp_pa
     path.write_text(spec.to_xml())
     settings: dict[str, Any] = {"speeds": (0.3,), "controllers": ("pd",), "schedule": SHORT}
     own, other = (
-        run_cell(Experiment(**settings, world=world).cells()[0]) for world in ("", str(path))
+        run_cell(Experiment(**settings, mjcf=world).cells()[0]) for world in ("", str(path))
     )
-    assert other.attrs["world"] == str(path)
-    assert len(other.attrs["world_sha256"]) == 64
+    assert other.attrs["mjcf"] == str(path)
+    assert len(other.attrs["mjcf_sha256"]) == 64
     first = {"stride": slice(0, 2)}
     np.testing.assert_allclose(
         other["peak_error"].isel(first), own["peak_error"].isel(first), atol=2e-4

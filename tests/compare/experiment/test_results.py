@@ -152,7 +152,7 @@ def test_another_experiment_is_not_mixed_in(copy: Results) -> None:
     other = dataclasses.replace(copy.experiment, base="free", schedule=Schedule(scatter=0.0))
     text = message(lambda: Results.create(other, copy.folder), copy.folder)
     assert text == (
-        "holds another experiment (base is 'locked' there, and 'free' here; schedule.practice is "
+        "holds another experiment (base is 'locked' there, and 'free' here; schedule.baseline is "
         "4.0 there, and 20.0 here; schedule.learning is 6.0 there, and 20.0 here; schedule.scatter "
         "is 0.01 there, and 0.0 here); leave these options out to go on with it, or choose another "
         "folder"

@@ -53,7 +53,7 @@ def test_strides_of_another_schedule_are_not_taken_where_the_config_is_lost(
     (copy.folder / "config.json").unlink()
     if not manifest:
         (copy.folder / "manifest.json").unlink()
-    other = dataclasses.replace(copy.experiment, schedule=Schedule(practice=4.0, learning=1.0))
+    other = dataclasses.replace(copy.experiment, schedule=Schedule(baseline=4.0, learning=1.0))
     text = refused(lambda: run(other, copy))
     assert "strides/ilc_nominal_0.nc: is of another simulation" in text
     assert "schedule.learning 6.0 there, 1.0 here" in text
@@ -65,7 +65,7 @@ def test_strides_of_another_schedule_are_simulated_again_where_that_is_asked_for
     comparison: Results, copy: Results
 ) -> None:
     (copy.folder / "config.json").unlink()
-    other = dataclasses.replace(copy.experiment, schedule=Schedule(practice=4.0, learning=1.0))
+    other = dataclasses.replace(copy.experiment, schedule=Schedule(baseline=4.0, learning=1.0))
     again = run(other, copy, resimulate=True)
     strides = again.strides(again.find(controller="ilc"))
     assert (
@@ -101,7 +101,7 @@ def test_strides_under_another_controllers_name_are_refused(copy: Results) -> No
 def test_strides_of_another_world_robot_seed_base_or_speed_are_refused(
     copy: Results, tmp_path: Path, change: dict[str, object], named: str
 ) -> None:
-    short = Schedule(startup=0.1, practice=0.5, learning=0.5)
+    short = Schedule(startup=0.1, baseline=0.5, learning=0.5)
     settings = {"speeds": (0.0, 0.45), "controllers": ("pd",), "schedule": short}
     other = run_experiment(
         Experiment(**{**settings, **change}),  # type: ignore[arg-type]
@@ -293,7 +293,7 @@ def test_a_command_that_fails_leaves_no_folder_behind(
 
     monkeypatch.setattr("pronk_pin.compare.experiment.run.run_cell", fail)
     assert main(["compare", "--speeds", "0.3", "--controllers", "pd", "--workers", "1"]) == 130
-    assert main(["compare", "--world", "missing.xml"]) == 1
+    assert main(["compare", "--mjcf", "missing.xml"]) == 1
     assert not list(tmp_path.iterdir())
 
 

@@ -1,4 +1,4 @@
-"""What practice learned is what MuJoCo's world has and the model lacks, and no more is claimed."""
+"""What learning learned is what MuJoCo's world has and the model lacks, and no more is claimed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from pronk_pin.compare import (
     random_scenarios,
     run_experiment,
 )
-from pronk_pin.compare.identification import TERMS, Term, explained, foreign, words
+from pronk_pin.compare.identification import TERMS, Term, explained, foreign, remarks
 from pronk_pin.compare.identification.equations import equations, ground_free, phase_forces
 from pronk_pin.compare.identification.estimate import estimate
 from pronk_pin.compare.identification.model_terms import Motion, parameters, truth
@@ -51,7 +51,7 @@ NOISE = {"tick_joints": 5e-4, "tick_joint_rates": 0.05, "tick_torque": 0.1}
 IMU = 0.3
 
 
-def practise(
+def simulate_learning(
     scenario: Scenario,
     *,
     controller: str = "ilc",
@@ -59,7 +59,7 @@ def practise(
     slope: float = 0.0,
     seed: int = 0,
 ) -> xr.Dataset:
-    """The strides of a short practice, on a ground that may rise forwards [rad]."""
+    """The strides of a short learning run, on a ground that may rise forwards [rad]."""
     robot, library = load_robot("a1"), load_library("a1")
     gaits = [library.at(speed) for speed in speeds]
     simulation = Simulation(
@@ -67,7 +67,7 @@ def practise(
         gaits,
         load_controller(controller),
         scenario,
-        schedule=Schedule(practice=1.5, learning=5.5),
+        schedule=Schedule(baseline=1.5, learning=5.5),
         rng=np.random.default_rng(seed),
     )
     if slope:
@@ -100,13 +100,13 @@ def explain_noisy(strides: xr.Dataset, *, seed: int = 1, **options: object) -> E
 
 
 @pytest.fixture(scope="module")
-def practised() -> xr.Dataset:
-    return practise(COMBINED)
+def learned_strides() -> xr.Dataset:
+    return simulate_learning(COMBINED)
 
 
 @pytest.fixture(scope="module")
-def found(practised: xr.Dataset) -> Explanation:
-    return explain_noisy(practised)
+def found(learned_strides: xr.Dataset) -> Explanation:
+    return explain_noisy(learned_strides)
 
 
 def true_values(scenario: Scenario) -> Array:
@@ -132,22 +132,22 @@ _OF_JOINTS = [term for term in TERMS if term.cause not in ("load", "delay")]
 @pytest.mark.parametrize("term", _OF_JOINTS, ids=lambda term: term.name)
 def test_a_column_is_what_the_mended_model_needs_more(robot: Robot, term: Term) -> None:
     motion, step = random_motion(robot, 5), 0.1
-    mended, columns = (
+    identified, columns = (
         robot.with_parameters(parameters({term.name: step}, robot)),
         term.column(robot, motion),
     )
     for q, v, a, tau, column in zip(motion.q, motion.v, motion.a, motion.tau, columns, strict=True):
-        difference = pin.rnea(mended.model, mended.data, q, v, a)
+        difference = pin.rnea(identified.model, identified.data, q, v, a)
         difference = difference - pin.rnea(robot.model, robot.data, q, v, a)
-        difference[6:] += tau - mended.joint_torques(tau, v[6:])
+        difference[6:] += tau - identified.joint_torques(tau, v[6:])
         np.testing.assert_allclose(column, difference / step, atol=1e-9)
 
 
 def test_a_payload_is_a_mass_and_its_moments(robot: Robot) -> None:
     mass, place = 2.0, np.array([0.1, 0.0, 0.05])
     values = {"payload": mass, "trunk moment x": mass * place[0], "trunk moment z": mass * place[2]}
-    mended = robot.with_parameters(parameters(values, robot))
-    np.testing.assert_allclose(mended.parameters.payload_position, place)
+    identified = robot.with_parameters(parameters(values, robot))
+    np.testing.assert_allclose(identified.parameters.payload_position, place)
     shifted = parameters({"trunk moment x": 0.1}, robot)
     assert shifted.payload == 0.0
     assert shifted.trunk_shift[0] == pytest.approx(0.1 / robot.model.inertias[1].mass)
@@ -187,10 +187,10 @@ def test_forces_on_the_feet_do_not_enter_the_balance(robot: Robot) -> None:
 
 
 def test_with_the_true_parameters_nothing_is_left_of_mujocos_motion(
-    robot: Robot, practised: xr.Dataset
+    robot: Robot, learned_strides: xr.Dataset
 ) -> None:
     true = true_values(COMBINED)
-    for phases in recordings(practised).values():
+    for phases in recordings(learned_strides).values():
         rows = equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
         rest = rows.y - rows.A @ true
         for group, most in ((0, 0.05), (1, 0.05), (3, 0.005), (4, 0.005)):
@@ -201,11 +201,11 @@ def test_with_the_true_parameters_nothing_is_left_of_mujocos_motion(
 
 
 def test_a_torque_stamped_a_tick_late_spoils_everything(
-    robot: Robot, practised: xr.Dataset
+    robot: Robot, learned_strides: xr.Dataset
 ) -> None:
-    late, true, rest = practised.copy(), true_values(COMBINED), []
-    late["tick_torque"] = practised["tick_torque"].shift(tick=1).fillna(0.0)
-    for strides in (practised, late):
+    late, true, rest = learned_strides.copy(), true_values(COMBINED), []
+    late["tick_torque"] = learned_strides["tick_torque"].shift(tick=1).fillna(0.0)
+    for strides in (learned_strides, late):
         phases = next(iter(recordings(strides).values()))
         rows = equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
         mine = rows.group == 4
@@ -225,10 +225,10 @@ def test_all_causes_at_once_are_found_through_sensor_noise(found: Explanation) -
     assert list(table.index[~table["seen"]]) == ["trunk moment x", "trunk moment z"]
 
 
-def test_intervals_hold_the_truth(practised: xr.Dataset, found: Explanation) -> None:
+def test_intervals_hold_the_truth(learned_strides: xr.Dataset, found: Explanation) -> None:
     """Over draws of the noise: in one of them all terms are off together."""
     inside = []
-    for one in (found, *(explain_noisy(practised, seed=seed) for seed in (2, 3))):
+    for one in (found, *(explain_noisy(learned_strides, seed=seed) for seed in (2, 3))):
         seen = one.table()[lambda table: table["seen"]]
         inside += [(seen["low"] <= seen["true"]) & (seen["true"] <= seen["high"])]
     assert np.mean(inside) >= 0.8
@@ -246,7 +246,7 @@ def test_intervals_hold_the_truth(practised: xr.Dataset, found: Explanation) -> 
     ids=lambda value: value.name if isinstance(value, Scenario) else "",
 )
 def test_a_single_cause_is_read_and_no_other(scenario: Scenario, most: Mapping[str, float]) -> None:
-    table = explain_noisy(practise(scenario)).table()
+    table = explain_noisy(simulate_learning(scenario)).table()
     for name, share in most.items():
         true = table.loc[name, "true"]
         assert abs(table.loc[name, "estimate"] - true) < share * true, name
@@ -256,10 +256,10 @@ def test_a_single_cause_is_read_and_no_other(scenario: Scenario, most: Mapping[s
 
 
 def test_other_strides_as_instruments_take_the_noise_bias_away(
-    robot: Robot, practised: xr.Dataset
+    robot: Robot, learned_strides: xr.Dataset
 ) -> None:
     rng = np.random.default_rng(5)
-    loud = with_noise(with_noise(practised, rng), rng)
+    loud = with_noise(with_noise(learned_strides, rng), rng)
     rows = {
         speed: equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
         for speed, phases in recordings(loud, imu_noise=IMU, rng=rng).items()
@@ -284,21 +284,21 @@ def test_causes_add_up_and_explain_what_was_learned(found: Explanation) -> None:
     assert float(found.share_table.sel(cause="deviation", part="stance", joint="thigh")) > 0.05
 
 
-def test_stance_alone_does_not_tell_load_from_weak_motors(practised: xr.Dataset) -> None:
-    alone = explain_noisy(practised, parts=("stance",))
+def test_stance_alone_does_not_tell_load_from_weak_motors(learned_strides: xr.Dataset) -> None:
+    alone = explain_noisy(learned_strides, parts=("stance",))
     names = {frozenset((TERMS[i].name, TERMS[j].name)) for i, j, _ in alone.confounding.pairs}
     assert frozenset(("payload", "weak motors")) in names
-    text = " ".join(words(alone))
+    text = " ".join(remarks(alone))
     assert "Not told apart: payload and weak motors" in text
-    both = explain_noisy(practised)
-    assert "payload and weak motors" not in " ".join(words(both))
+    both = explain_noisy(learned_strides)
+    assert "payload and weak motors" not in " ".join(remarks(both))
     assert alone.confounding.condition > 2.0 * both.confounding.condition
 
 
 def test_hip_friction_is_not_told_apart_and_the_trunks_moments_not_seen(
     found: Explanation,
 ) -> None:
-    text = " ".join(words(found))
+    text = " ".join(remarks(found))
     assert "Not told apart: hip damping and hip Coulomb" in text
     assert "swing the legs in the air" in text
     assert "Not seen in this motion: trunk moment x and trunk moment z" in text
@@ -306,19 +306,21 @@ def test_hip_friction_is_not_told_apart_and_the_trunks_moments_not_seen(
 
 def test_soft_ground_is_named_and_not_taken_for_friction() -> None:
     soft = dataclasses.replace(SCENARIOS["nominal"], name="soft", ground_time_constant=0.01)
-    found = explain_noisy(practise(soft))
-    assert "the ground gives way by" in " ".join(words(found))
+    found = explain_noisy(simulate_learning(soft))
+    assert "the ground gives way by" in " ".join(remarks(found))
     table = found.table()
     for name in ("thigh damping", "calf damping", "thigh Coulomb", "calf Coulomb"):
         assert table.loc[name, "estimate"] == pytest.approx(table.loc[name, "true"], rel=0.05)
-    assert "gives way" not in " ".join(words(explain_noisy(practise(SCENARIOS["nominal"]))))
+    assert "gives way" not in " ".join(
+        remarks(explain_noisy(simulate_learning(SCENARIOS["nominal"])))
+    )
 
 
 def test_a_slope_is_reported_and_not_taken_for_friction() -> None:
     slope = np.radians(3.0)
-    found = explain_noisy(practise(SCENARIOS["nominal"], slope=slope))
+    found = explain_noisy(simulate_learning(SCENARIOS["nominal"], slope=slope))
     assert found.ground.slope == pytest.approx(slope, abs=np.radians(0.3))
-    text = " ".join(words(found))
+    text = " ".join(remarks(found))
     assert "the ground rises by" in text
     assert "Unexplained: something that is none of the terms is at work" in text
     assert foreign(found)
@@ -329,15 +331,15 @@ def test_a_slope_is_reported_and_not_taken_for_friction() -> None:
 
 def test_a_slope_along_which_the_trunk_is_held_is_felt_and_not_taken_for_friction() -> None:
     world = dataclasses.replace(COMBINED, name="slope", slope=0.05)
-    found = explain_noisy(practise(world))
+    found = explain_noisy(simulate_learning(world))
     assert found.ground.slope == pytest.approx(0.05, abs=0.002)
-    assert "the ground rises by 2.9 degrees" in " ".join(words(found))
+    assert "the ground rises by 2.9 degrees" in " ".join(remarks(found))
     assert not foreign(found)
     table = found.table()
     for name in ("thigh armature", "calf armature", "thigh Coulomb", "calf Coulomb", "payload"):
         assert table.loc[name, "estimate"] == pytest.approx(table.loc[name, "true"], rel=0.06), name
     # The slope's part of the weight, borne by four legs of which each knee carries its share.
-    level = explain_noisy(practise(COMBINED))
+    level = explain_noisy(simulate_learning(COMBINED))
     share = {one: one.share_table.sel(part="stance", cause="gravity") for one in (found, level)}
     assert abs(float(share[found].sel(joint="thigh"))) > 0.1
     assert float(np.abs(share[level]).max()) < 0.01
@@ -345,40 +347,42 @@ def test_a_slope_along_which_the_trunk_is_held_is_felt_and_not_taken_for_frictio
 
 def test_another_gravity_is_felt_and_not_taken_for_load() -> None:
     world = dataclasses.replace(SCENARIOS["nominal"], name="moon", gravity=8.8)
-    found = explain_noisy(practise(world))
+    found = explain_noisy(simulate_learning(world))
     assert found.ground.gravity == pytest.approx(8.8, abs=0.02)
     assert found.ground.slope == pytest.approx(0.0, abs=0.005)
-    assert "gravity is 8.80 m/s^2, and 9.81 in the model" in " ".join(words(found))
+    assert "gravity is 8.80 m/s^2, and 9.81 in the model" in " ".join(remarks(found))
     assert found.table().loc["payload", "estimate"] == pytest.approx(0.0, abs=0.15)
-    assert "gravity is" not in " ".join(words(explain_noisy(practise(SCENARIOS["nominal"]))))
+    assert "gravity is" not in " ".join(
+        remarks(explain_noisy(simulate_learning(SCENARIOS["nominal"])))
+    )
 
 
-def test_few_strides_at_one_speed_are_called_so(practised: xr.Dataset) -> None:
-    little = explain_noisy(practised.isel(speed=[1], last=slice(-3, None)))
-    text = " ".join(words(little))
+def test_few_strides_at_one_speed_are_called_so(learned_strides: xr.Dataset) -> None:
+    little = explain_noisy(learned_strides.isel(speed=[1], last=slice(-3, None)))
+    text = " ".join(remarks(little))
     assert "Only 3 strides" in text
     assert "One speed only" in text
     assert "95 % interval" in describe(little)
 
 
 def test_the_mended_gaits_beat_practice_where_nothing_was_practised(
-    found: Explanation, practised: xr.Dataset
+    found: Explanation, learned_strides: xr.Dataset
 ) -> None:
     table = close_loop(
         found,
-        practised,
+        learned_strides,
         speeds=(0.35,),
         scenarios=[COMBINED],
         controllers=("model", "ilc", "identified+gait"),
-        schedule=Schedule(practice=5.0, learning=4.0),
+        schedule=Schedule(baseline=5.0, learning=4.0),
         progress=False,
     ).set_index("controller")
     assert table["upright"].all()
     for joint in ("thigh", "calf"):
-        mended = table.loc["identified+gait", joint]
-        assert mended < 0.012
-        assert mended < 0.65 * table.loc["ilc", joint]  # after 11 strides of learning
-        assert mended < 0.2 * table.loc["model", joint]
+        identified = table.loc["identified+gait", joint]
+        assert identified < 0.012
+        assert identified < 0.65 * table.loc["ilc", joint]  # after 11 strides of learning
+        assert identified < 0.2 * table.loc["model", joint]
     assert "identified+gait" in format_loop(table.reset_index())
 
 
@@ -388,14 +392,14 @@ def test_the_command_prints_draws_and_writes(
     experiment = Experiment(
         speeds=(0.0, 0.4),
         controllers=("identified", "ilc"),
-        schedule=Schedule(practice=1.0, learning=5.0),
+        schedule=Schedule(baseline=1.0, learning=5.0),
     )
     folder = tmp_path / "result"
     results = run_experiment(experiment, folder, workers=1, progress=False)
     assert [cell.controller for cell in experiment.cells()] == ["ilc", "identified"]
     strides = results.strides(experiment.cells()[1])
     assert float(np.abs(strides["feedforward"]).max()) > 5.0
-    files = [tmp_path / name for name in ("figure.png", "mended.urdf", "mended.xml")]
+    files = [tmp_path / name for name in ("figure.png", "identified.urdf", "identified.xml")]
     options = zip(("--figure", "--write-urdf", "--write-mjcf"), map(str, files), strict=True)
     assert main(["explain", str(folder), *(word for pair in options for word in pair)]) == 0
     printed = capsys.readouterr().out
@@ -408,15 +412,17 @@ def test_the_command_prints_draws_and_writes(
     assert "95 % interval" in files[1].read_text()
 
 
-def test_what_cannot_be_explained_is_refused(practised: xr.Dataset, found: Explanation) -> None:
+def test_what_cannot_be_explained_is_refused(
+    learned_strides: xr.Dataset, found: Explanation
+) -> None:
     with pytest.raises(InvalidInput, match="has no ticks, which explain reads"):
-        explain(practised.drop_vars("tick_joints"))
+        explain(learned_strides.drop_vars("tick_joints"))
     with pytest.raises(InvalidInput, match="no speed has 2 whole strides"):
-        explain(practised.isel(last=slice(-1, None)))
+        explain(learned_strides.isel(last=slice(-1, None)))
     with pytest.raises(InvalidInput, match="explain needs a locked base"):
-        explain(practised.assign_attrs(base="free"))
+        explain(learned_strides.assign_attrs(base="free"))
     with pytest.raises(InvalidInput, match="2 gaits for 3 speeds"):
-        explain(practised, gaits=[load_library("a1").at(v) for v in (0.1, 0.2)])
+        explain(learned_strides, gaits=[load_library("a1").at(v) for v in (0.1, 0.2)])
     with pytest.raises(InvalidInput, match=r"'txtt'; choose png, svg, pdf"):
         write_explanation_figure(found, Path("figure.txtt"))
 
@@ -434,7 +440,9 @@ def test_intervals_hold_the_truth_in_nine_of_ten_random_worlds() -> None:
             payload=payload,
             torque_constant=float(rng.uniform(0.85, 1.05)),
         )
-        strides = with_noise(practise(world, speeds=(-0.4, -0.1, 0.2, 0.5, 0.8), seed=seed), rng)
+        strides = with_noise(
+            simulate_learning(world, speeds=(-0.4, -0.1, 0.2, 0.5, 0.8), seed=seed), rng
+        )
         table = explain(strides, imu_noise=IMU, rng=rng, draws=200).table()
         seen = table[table["seen"]]
         inside.append(((seen["low"] <= seen["true"]) & (seen["true"] <= seen["high"])).mean())
@@ -447,7 +455,7 @@ def test_intervals_hold_the_truth_in_sampled_worlds() -> None:
     do not mislead those that are."""
     rng, tables = np.random.default_rng(11), []
     for seed, world in enumerate(random_scenarios(50, seed=0)):
-        strides = practise(world, speeds=(-0.4, -0.1, 0.2, 0.5, 0.8), seed=seed)
+        strides = simulate_learning(world, speeds=(-0.4, -0.1, 0.2, 0.5, 0.8), seed=seed)
         noisy = with_noise(strides, rng)
         tables.append(explain(noisy, imu_noise=IMU, rng=rng, draws=200).table())
     table = pd.concat(tables)
@@ -474,7 +482,9 @@ _NOMINAL = SCENARIOS["nominal"]
     ids=lambda world: world.name,
 )
 def test_the_mended_gaits_keep_within_12_mrad_at_speeds_left_out(world: Scenario) -> None:
-    strides = with_noise(practise(world, speeds=(-0.5, -0.1, 0.3, 0.8)), np.random.default_rng(3))
+    strides = with_noise(
+        simulate_learning(world, speeds=(-0.5, -0.1, 0.3, 0.8)), np.random.default_rng(3)
+    )
     table = close_loop(
         explain(strides, imu_noise=IMU, rng=np.random.default_rng(4)),
         strides,
@@ -483,8 +493,8 @@ def test_the_mended_gaits_keep_within_12_mrad_at_speeds_left_out(world: Scenario
         controllers=("ilc", "identified+gait"),
         progress=False,
     )
-    mended = table[table["controller"] == "identified+gait"]
+    identified = table[table["controller"] == "identified+gait"]
     learned = table[table["controller"] == "ilc"]
-    assert mended["upright"].all()
-    assert mended[["thigh", "calf"]].to_numpy().max() < 0.012
-    assert mended["calf"].mean() < learned["calf"].mean()
+    assert identified["upright"].all()
+    assert identified[["thigh", "calf"]].to_numpy().max() < 0.012
+    assert identified["calf"].mean() < learned["calf"].mean()

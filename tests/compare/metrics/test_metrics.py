@@ -22,20 +22,20 @@ from pronk_pin.compare.metrics import (
 )
 from pronk_pin.control import PARTS
 
-PRACTICE = 40
+BASELINE = 40
 NAMES = [f"{leg}_{joint}" for leg in ("FL", "FR", "RL", "RR") for joint in ("hip", "thigh", "calf")]
 
 
 @pytest.fixture
 def made() -> Callable[..., xr.Dataset]:
-    def build(peak: Array, *, practice: int = PRACTICE, controller: str = "ilc") -> xr.Dataset:
+    def build(peak: Array, *, baseline: int = BASELINE, controller: str = "ilc") -> xr.Dataset:
         """Strides of one robot by the peak errors of its calves; other joints have less."""
         n = len(peak)
         errors = peak[None, :, None] * np.tile([0.1, 0.5, 1.0], 4)
         torque = np.ones((1, n, 1, 5, 12))
         stride, scalars = ("speed", "stride"), np.ones((1, n))
         curve = (*stride, "part", "phase", "joint")
-        learning = (np.arange(n) >= practice) & (controller == "ilc")
+        learning = (np.arange(n) >= baseline) & (controller == "ilc")
         return xr.Dataset(
             {
                 "count": ("speed", [n]),
@@ -67,9 +67,9 @@ def made() -> Callable[..., xr.Dataset]:
 def learned(
     strides: int = 40, *, begin: float = 0.1, end: float = 0.02, rate: float = 0.5
 ) -> Array:
-    """Peaks that are constant in practice and then fall by a rate from stride to stride."""
+    """Peaks that are constant in learning and then fall by a rate from stride to stride."""
     falling = end + (begin - end) * rate ** np.arange(strides)
-    return np.concatenate([np.full(PRACTICE, begin), falling])
+    return np.concatenate([np.full(BASELINE, begin), falling])
 
 
 def value(summary: pd.DataFrame, metric: str, joint: str = "-") -> float:
@@ -138,8 +138,8 @@ def test_who_does_not_learn_is_judged_on_the_same_strides_as_who_does(
 ) -> None:
     for controller in ("pd", "ilc"):
         strides = made(learned(8), controller=controller)
-        strides["start"] = (("speed", "stride"), 0.4 * np.arange(PRACTICE + 8.0)[None])
-        strides.attrs |= {"switch": 0.4 * PRACTICE, "timestep": 0.001}
+        strides["start"] = (("speed", "stride"), 0.4 * np.arange(BASELINE + 8.0)[None])
+        strides.attrs |= {"switch": 0.4 * BASELINE, "timestep": 0.001}
         assert steady(strides).sizes["stride"] == 8
         strides.attrs["switch"] = 1000.0  # never
         assert steady(strides).sizes["stride"] == STEADY_STRIDES
@@ -188,7 +188,7 @@ def test_a_robot_has_settled_only_when_both_joints_have(
 ) -> None:
     strides = made(learned())
     worse = [name.endswith(joint) for name in NAMES]
-    strides["peak_error"][0, PRACTICE:, worse] = 0.5
+    strides["peak_error"][0, BASELINE:, worse] = 0.5
     assert np.isnan(value(summarize(strides), "strides_to_converge"))
 
 
@@ -201,7 +201,7 @@ def test_unfinished_strides_do_not_count_for_convergence(made: Callable[..., xr.
 def test_learning_without_practice_has_nothing_to_compare_with(
     made: Callable[..., xr.Dataset],
 ) -> None:
-    strides = made(np.full(30, 0.02), practice=0)
+    strides = made(np.full(30, 0.02), baseline=0)
     assert np.isnan(strides_to_converge(strides.isel(speed=0), "calf"))
 
 

@@ -58,7 +58,7 @@ def test_intervals_hold_the_true_mean_about_as_often_as_they_say(
 def test_robots_of_one_sampled_world_do_not_make_it_sure(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Worlds scatter, the robots in them hardly: the interval must be that of 20 worlds."""
+    """Worlds scatter, the robots in them hardly: the interval must be that of 20 scenarios."""
     monkeypatch.setattr("pronk_pin.compare.metrics.statistics.RESAMPLES", 499)
     rng, hits, trials = np.random.default_rng(8), 0, 200
     for _ in range(trials):
@@ -152,7 +152,7 @@ def test_more_seeds_in_a_sampled_world_are_no_more_worlds() -> None:
         ]
     )
     assert tuple(mean_interval(often)) == pytest.approx(tuple(mean_interval(once)), rel=5e-3)
-    assert compare_pairs(often, often + 1.0).unit == "world"
+    assert compare_pairs(often, often + 1.0).unit == "scenario"
     four = often.loc[worlds[:4]]
     assert compare_pairs(four, four + 1.0).unit == "speed"  # too few worlds, however many seeds
 

@@ -11,10 +11,10 @@ import xarray as xr
 
 from pronk_pin.compare.metrics.time_to_beat import (
     WINDOW,
-    Practice,
+    PeakHistory,
+    beat_rows,
     beaten,
-    practice,
-    rows_of_beating,
+    peak_history,
     strides_to_beat,
 )
 
@@ -42,12 +42,12 @@ def test_the_same_error_does_not_beat_it() -> None:
 
 
 @pytest.fixture
-def simulated() -> Callable[..., Practice]:
-    def build(controller: str, calf: float, thigh: float, *, upright: float = 1.0) -> Practice:
+def simulated() -> Callable[..., PeakHistory]:
+    def build(controller: str, calf: float, thigh: float, *, upright: float = 1.0) -> PeakHistory:
         settings = {"robot": "a1", "base": "locked", "scenario": "nominal", "seed": 0}
         learns = controller != "model"
         peaks = np.column_stack([np.linspace(0.1, calf, 41), np.linspace(0.1, thigh, 41)])
-        return Practice(
+        return PeakHistory(
             {**settings, "controller": controller},
             np.array([0.3]),
             (peaks if learns else np.empty((0, 2)),),
@@ -58,14 +58,14 @@ def simulated() -> Callable[..., Practice]:
     return build
 
 
-def values(practised: list[Practice]) -> dict[str, float]:
-    rows = list(rows_of_beating(practised))
+def values(histories: list[PeakHistory]) -> dict[str, float]:
+    rows = list(beat_rows(histories))
     assert {row["metric"] for row in rows} == {"strides_to_beat_model"}
     return {str(row["joint"]): float(row["value"]) for row in rows}  # type: ignore[arg-type]
 
 
 def test_both_joints_count_and_the_later_one_decides(
-    simulated: Callable[..., Practice],
+    simulated: Callable[..., PeakHistory],
 ) -> None:
     found = values([simulated("model", 0.05, 0.08), simulated("ilc", 0.0, 0.0)])
     assert found["thigh"] < found["calf"] == found["-"]
@@ -74,14 +74,14 @@ def test_both_joints_count_and_the_later_one_decides(
     assert np.isnan(one_is_not_enough["-"])
 
 
-def test_who_fell_has_beaten_nobody(simulated: Callable[..., Practice]) -> None:
+def test_who_fell_has_beaten_nobody(simulated: Callable[..., PeakHistory]) -> None:
     found = values([simulated("model", 0.05, 0.08), simulated("ilc", 0.0, 0.0, upright=0.0)])
     assert np.isnan(list(found.values())).all()
 
 
-def test_without_the_model_there_is_nobody_to_beat(simulated: Callable[..., Practice]) -> None:
-    assert not list(rows_of_beating([simulated("ilc", 0.0, 0.0)]))
-    assert not list(rows_of_beating([simulated("model", 0.0, 0.0)]))
+def test_without_the_model_there_is_nobody_to_beat(simulated: Callable[..., PeakHistory]) -> None:
+    assert not list(beat_rows([simulated("ilc", 0.0, 0.0)]))
+    assert not list(beat_rows([simulated("model", 0.0, 0.0)]))
 
 
 def test_the_count_of_those_who_beat_it_leaves_nobody_out() -> None:
@@ -118,7 +118,7 @@ def test_strides_are_read_as_they_are_stored() -> None:
             "seed": 2,
         },
     )
-    found = practice(strides)
+    found = peak_history(strides)
     np.testing.assert_allclose(found.learning[0], [[22, 12], [23, 13], [24, 14]])
     np.testing.assert_allclose(found.level, [[23, 13]])
     assert found.upright.tolist() == [1.0]

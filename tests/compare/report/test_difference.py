@@ -77,7 +77,7 @@ def test_a_fall_is_a_change_whatever_the_errors_do(before: np.ndarray) -> None:
 
 
 def test_results_without_anything_in_common_are_refused(before: np.ndarray) -> None:
-    with pytest.raises(InvalidInput, match="no world and controller in common"):
+    with pytest.raises(InvalidInput, match="no scenario and controller in common"):
         changes(summary(before), summary(before, controller="pd"))
 
 

@@ -17,23 +17,23 @@ import xarray as xr
 
 from pronk_pin.compare import Results, Simulation, summarize
 from pronk_pin.compare.metrics.statistics import compare_controllers
-from pronk_pin.compare.metrics.time_to_beat import lessons, practice
+from pronk_pin.compare.metrics.time_to_beat import lessons, peak_history
 from pronk_pin.compare.report.difference import format_changes
 from pronk_pin.compare.report.limitations import limitations
 from pronk_pin.compare.report.tables import (
     beside_the_paper,
     overview,
-    sampled_worlds,
+    sampled_scenarios,
     worst_reduction,
 )
 from pronk_pin.compare.report.text import format_suite, format_tables, suite_verdict, verdict
-from pronk_pin.compare.studies.gain_reduction import describe_gains, judged
+from pronk_pin.compare.studies.gain_reduction import describe_gains, mean_peaks
 from pronk_pin.compare.studies.reproduce import format_reproduction
 from pronk_pin.compare.studies.seeding import LEARNERS, describe_seeding
 from pronk_pin.compare.studies.transfer import describe_transfers
 from pronk_pin.control import SKIPPED
 from pronk_pin.viz.figures.learning_figures import errors_by_seed
-from pronk_pin.viz.figures.suite_figures import by_world
+from pronk_pin.viz.figures.suite_figures import by_scenario
 
 
 @pytest.fixture(autouse=True)
@@ -67,7 +67,7 @@ def test_where_all_fell_the_terminal_says_so_and_shows_no_number(summary: pd.Dat
     text = format_tables(let_fall(summary), scenario="nominal")
     check_words(text)
     flat = " ".join(text.split())
-    assert "no robot stayed up under practice and under PD. All 6 robots fell." in flat
+    assert "no robot stayed up under learning and under PD. All 6 robots fell." in flat
     assert "Nothing stands beside the paper's Table I: no robot stayed up." in flat
     assert "wins" not in text
     assert "intervals over" not in text
@@ -77,7 +77,7 @@ def test_where_all_fell_the_terminal_says_so_and_shows_no_number(summary: pd.Dat
 @pytest.mark.parametrize(
     ("controller", "clause"),
     [
-        ("ilc", "Nothing is concluded: no robot stayed up under practice. 2 robots fell."),
+        ("ilc", "Nothing is concluded: no robot stayed up under learning. 2 robots fell."),
         ("pd", "Nothing is concluded: no robot stayed up under PD. 2 robots fell."),
         ("model", "nothing is concluded: no robot stayed up under the model's feedforward."),
     ],
@@ -94,7 +94,7 @@ def test_who_fell_altogether_is_named(summary: pd.DataFrame, controller: str, cl
 def test_robots_that_stand_at_other_speeds_only_cannot_be_compared(summary: pd.DataFrame) -> None:
     fallen = let_fall(let_fall(summary, "ilc", speed=0.3), "pd", speed=0.35)
     words = verdict(fallen, scenario="nominal")
-    assert "no robot has an error to compare under both practice and PD" in words
+    assert "no robot has an error to compare under both learning and PD" in words
     assert np.isnan(worst_reduction(fallen, scenario="nominal", controller="ilc")["calf"])
     check_words(format_tables(fallen, scenario="nominal"))
 
@@ -104,7 +104,7 @@ def test_errors_that_are_missing_are_not_compared(summary: pd.DataFrame) -> None
     summary.loc[lost, "value"] = np.nan
     text = format_tables(summary, scenario="nominal")
     check_words(text)
-    assert "no robot has an error to compare under both practice and PD" in " ".join(text.split())
+    assert "no robot has an error to compare under both learning and PD" in " ".join(text.split())
 
 
 def test_two_falls_are_no_win_and_no_tie(summary: pd.DataFrame) -> None:
@@ -151,7 +151,7 @@ def test_practice_that_nothing_taught_has_no_verdict_but_its_reasons(summary: pd
     assert (found.strides, found.taught) == (14, 0)
     words = verdict(idle, scenario="nominal")
     assert words == (
-        "Nothing is concluded: practice learned from none of its 14 strides of learning "
+        "Nothing is concluded: learning learned from none of its 14 strides of learning "
         "(6 too long, 8 false touchdown). No robot fell."
     )
     row = next(
@@ -183,7 +183,7 @@ def test_a_world_of_the_fallen_does_not_spoil_the_others(summary: pd.DataFrame) 
     both = pd.concat([summary, let_fall(summary).assign(scenario="slope")], ignore_index=True)
     words = suite_verdict(both)
     assert "In the calf it is better in 1 of 1." in words
-    assert "In slope nothing is concluded: no robot stayed up under practice and under the" in words
+    assert "In slope nothing is concluded: no robot stayed up under learning and under the" in words
     assert "less by 80% (80 to 80%) in nominal. " in words
     check_words(format_suite(both))
 
@@ -204,14 +204,14 @@ def test_sampled_worlds_of_the_fallen_are_not_counted_as_lost(summary: pd.DataFr
     worlds[2] = let_fall(worlds[2])
     some = pd.concat(worlds, ignore_index=True)
     words = verdict(some, scenario="random-4")
-    assert "it is less in 5 of 5 worlds" in words
+    assert "it is less in 5 of 5 scenarios" in words
     assert "6 robots fell." in words
     check_words(format_tables(some, scenario="random-4"))
     nobody = pd.concat(map(let_fall, worlds), ignore_index=True)
     assert verdict(nobody, scenario="random-4").startswith("Nothing is concluded: no robot stayed")
-    drawn = sampled_worlds(nobody, scenario="random-4")
+    drawn = sampled_scenarios(nobody, scenario="random-4")
     assert drawn["calf"].isna().to_numpy().all()
-    panels = by_world(drawn).axes
+    panels = by_scenario(drawn).axes
     assert [axes.texts[0].get_text() for axes in panels] == ["no robot stayed up"] * 2
     check_words(format_tables(nobody, scenario="random-4"))
 
@@ -305,7 +305,7 @@ def test_a_robot_without_a_finished_stride_can_be_summarised(comparison: Results
     assert table[~slow & upright]["value"].isna().all()
     assert table[slow & peak]["value"].notna().all()
     assert table[~slow & peak]["value"].isna().all()
-    assert np.isnan(practice(unfinished(strides, [20, 0])).upright[1])
+    assert np.isnan(peak_history(unfinished(strides, [20, 0])).upright[1])
 
 
 def test_a_simulation_without_a_finished_stride_can_be_summarised(comparison: Results) -> None:
@@ -313,7 +313,7 @@ def test_a_simulation_without_a_finished_stride_can_be_summarised(comparison: Re
     none = unfinished(strides, [0, 0])
     table = summarize(none)
     assert table[table["metric"] == "upright"]["value"].isna().tolist() == [True, True]
-    assert np.isnan(practice(none).upright).all()
+    assert np.isnan(peak_history(none).upright).all()
 
 
 def sweep(**changed: tuple[float, ...]) -> pd.DataFrame:
@@ -337,18 +337,18 @@ def test_gains_at_which_all_fall_answer_nothing() -> None:
 
 
 def test_a_transfer_to_where_practice_falls_is_open() -> None:
-    columns = ["task", "thigh", "calf", "thigh_practised", "calf_practised", "reuse", "right"]
+    columns = ["task", "thigh", "calf", "thigh_relearned", "calf_relearned", "reuse", "right"]
     rows = [
         ("at home", 0.02, 0.02, 0.02, 0.02, True, True),
         ("left out +0.30 m/s", 0.03, 0.03, 0.02, 0.02, True, False),
         ("slope", np.nan, np.nan, np.nan, np.nan, False, True),
     ]
     text = describe_transfers(pd.DataFrame(rows, columns=columns))
-    assert "practise again: open, as no robot stayed up that practised there" in text
-    assert "Of 2 answers of the rule 1 let a skill be reused" in text
+    assert "learn again: open, as no robot stayed up that learned there" in text
+    assert "Of 2 answers of the rule 1 let stored feedforward be reused" in text
     assert "nan" not in text
     text = describe_transfers(pd.DataFrame(rows[2:], columns=columns))
-    assert "Nothing is concluded: no robot stayed up that practised." in text
+    assert "Nothing is concluded: no robot stayed up that learned." in text
 
 
 def test_peaks_of_a_sweep_are_those_of_the_robots_that_stayed_up() -> None:
@@ -356,7 +356,7 @@ def test_peaks_of_a_sweep_are_those_of_the_robots_that_stayed_up() -> None:
     log = SimpleNamespace(peak_error=peaks, count=np.array([5, 5]))
 
     def found(upright: list[bool]) -> dict[str, float | int]:
-        return judged(cast(Simulation, SimpleNamespace(strides=log, upright=np.array(upright))))
+        return mean_peaks(cast(Simulation, SimpleNamespace(strides=log, upright=np.array(upright))))
 
     assert found([True, False])["calf"] == pytest.approx(0.1)
     assert found([True, False])["upright"] == 1

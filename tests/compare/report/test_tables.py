@@ -9,7 +9,7 @@ from pronk_pin.compare.report.tables import (
     answer,
     beside_the_paper,
     overview,
-    sampled_worlds,
+    sampled_scenarios,
     worst_reduction,
 )
 
@@ -80,7 +80,7 @@ def test_the_answer_has_every_world_and_sampled_ones_as_one(summary: pd.DataFram
     table = answer(pd.concat([summary, *sampled]))
     assert list(table.index.get_level_values("scenario").unique()) == ["nominal", "random-4"]
     assert table.loc[("random-4", "ilc"), "robots"] == 10
-    assert table.loc[("random-4", "ilc"), "unit"] == "world"
+    assert table.loc[("random-4", "ilc"), "unit"] == "scenario"
 
 
 def test_each_sampled_world_stands_beside_what_it_is_like(summary: pd.DataFrame) -> None:
@@ -91,10 +91,10 @@ def test_each_sampled_world_stands_beside_what_it_is_like(summary: pd.DataFrame)
         mine.loc[mine["metric"] == "peak_error", "value"] *= factor
         worlds.append(mine)
     worlds[0].loc[worlds[0][down & (worlds[0]["speed"] == 0.35)].index, "value"] = 0.0
-    table = sampled_worlds(pd.concat(worlds, ignore_index=True), scenario="random-4")
-    assert table.index.tolist() == ["random-4-1", "random-4-0"]  # by what practice leaves
+    table = sampled_scenarios(pd.concat(worlds, ignore_index=True), scenario="random-4")
+    assert table.index.tolist() == ["random-4-1", "random-4-0"]  # by what learning leaves
     for k, world in enumerate(random_scenarios(2, seed=4)):
-        assert table.loc[f"random-4-{k}", ("world", "payload")] == world.payload
+        assert table.loc[f"random-4-{k}", ("scenario", "payload")] == world.payload
     assert table.loc["random-4-1", ("calf", "ilc")] == pytest.approx(0.03)
     assert table.loc["random-4-0", ("calf", "ilc")] == pytest.approx(0.06)  # one fell
     assert table.loc["random-4-0", ("thigh", "pd")] == pytest.approx(3 * 0.075)

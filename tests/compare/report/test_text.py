@@ -59,7 +59,7 @@ def test_the_verdict_over_all_worlds_counts_them_and_names_the_exceptions(
     down = other.index[(other["metric"] == "upright") & (other["controller"] == "pd")][0]
     other.loc[down, "value"] = 0.0
     words = suite_verdict(pd.concat([summary, other], ignore_index=True))
-    assert "In 2 worlds" in words
+    assert "In 2 scenarios" in words
     assert "In the calf it is better in 2 of 2." in words
     assert "In the thigh it is better in 0 of 2; worse in nominal, slope." in words
     assert "2 of 4 robots come to beat it in both joints" in words
@@ -87,12 +87,14 @@ def test_of_sampled_worlds_each_counts_once(summary: pd.DataFrame) -> None:
     odd = (worlds[0]["controller"] == "ilc") & (worlds[0]["joint"] == "calf")
     worlds[0].loc[odd & (worlds[0]["metric"] == "peak_error"), "value"] = 0.2
     words = verdict(pd.concat(worlds, ignore_index=True), scenario="random-4")
-    assert words.startswith("In 6 sampled worlds, at 2 speeds in each, practice cuts the mean peak")
+    assert words.startswith(
+        "In 6 sampled scenarios, at 2 speeds in each, learning cuts the mean peak"
+    )
     assert "for the worst robot)" in words
     # calf: better but for the odd world, so open; thigh: worse everywhere
     assert "It cannot be told from the model's feedforward in the calf and does worse than" in words
-    assert "less in 5 of 6 worlds, and the probability that a robot improves is 83% (" in words
-    assert "by paired differences +7.5 mrad (+7.5 to +7.5); it is less in 0 of 6 worlds" in words
+    assert "less in 5 of 6 scenarios, and the probability that a robot improves is 83% (" in words
+    assert "by paired differences +7.5 mrad (+7.5 to +7.5); it is less in 0 of 6 scenarios" in words
     assert "6 of 12 robots come to beat the model in both joints and stay there" in words
 
 
@@ -105,5 +107,5 @@ def test_practice_that_wins_in_every_sampled_world_does_so_beyond_doubt(
     words = verdict(worlds.reset_index(drop=True), scenario="random-4")
     assert "It beats the model's feedforward in calf and thigh beyond doubt." in words
     text = format_tables(worlds.reset_index(drop=True), scenario="random-4")
-    assert "intervals over the worlds" in text
+    assert "intervals over the scenarios" in text
     assert "nan" not in text

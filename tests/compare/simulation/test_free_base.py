@@ -16,9 +16,9 @@ BASES = ("sagittal", "free")
 
 
 def pronked(
-    base: str, controller: str, practice: float, learning: float, **more: object
+    base: str, controller: str, baseline: float, learning: float, **more: object
 ) -> xr.Dataset:
-    schedule = Schedule(practice=practice, learning=learning)
+    schedule = Schedule(baseline=baseline, learning=learning)
     experiment = Experiment(base=base, controllers=(controller,), schedule=schedule, **more)  # type: ignore[arg-type]
     return run_cell(experiment.cells()[0])
 

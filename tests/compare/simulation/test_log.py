@@ -42,7 +42,7 @@ def stride(log: StrideLog, k: int = 0, *, left: float = 9.0) -> None:
     record = replace(
         StrideRecord.of(error, 0.0 * error, 2.0 * error, 3.0 * error), contact_error=CONTACT
     )
-    log.begin(ROW, np.array([1.0]), YES, left=np.array([left]))
+    log.begin(ROW, np.array([1.0]), YES, remaining=np.array([left]))
     down = ticks(STANCE, np.full(STANCE, 0.3), joint=float(k))
     log.stance(ROW, record, down, length(STANCE))
     height = 0.34 - 0.1 * np.linspace(-1.0, 1.0, FLIGHT) ** 2
@@ -154,7 +154,7 @@ def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
 
     log.write(rows, 5, motion)
     log.torques(rows, tape, gains, limit, 25)
-    phase = log.phase(rows, np.array([25, 24]), felt=5)
+    phase = log.phase(rows, np.array([25, 24]), sensed=5)
 
     np.testing.assert_array_equal(phase.joints[:, 5:], joints)
     np.testing.assert_array_equal(log.force[rows, 5:25], force)

@@ -96,7 +96,7 @@ def test_a_few_strides_of_learning_reduce_the_error(comparison: Results) -> None
 def test_strides_are_marked_as_learning_from_the_end_of_practice_on(comparison: Results) -> None:
     ilc, pd = (comparison.strides(comparison.find(controller=name)) for name in ("ilc", "pd"))
     finished = ilc["start"].notnull()
-    late = ilc["start"] > comparison.experiment.schedule.practice - 1e-9
+    late = ilc["start"] > comparison.experiment.schedule.baseline - 1e-9
     assert ((ilc["learning"] == 1.0) == late).where(finished, True).all()
     assert late.any()
     assert not (pd["learning"] == 1.0).any()
@@ -156,7 +156,7 @@ def test_a_robot_below_the_height_of_its_gait_has_fallen(
     assert watched.upright.tolist() == [True, False]
 
 
-@pytest.mark.parametrize("name", ["startup", "practice", "learning", "scatter"])
+@pytest.mark.parametrize("name", ["startup", "baseline", "learning", "scatter"])
 @pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
 def test_a_schedule_needs_finite_durations(name: str, value: float) -> None:
     with pytest.raises(InvalidInput, match=f"schedule: {name}=.*; give a number from 0 to "):
@@ -165,9 +165,9 @@ def test_a_schedule_needs_finite_durations(name: str, value: float) -> None:
 
 def test_a_schedule_needs_time_for_a_stride() -> None:
     with pytest.raises(InvalidInput) as caught:
-        Schedule(practice=0.2, learning=0.1)
+        Schedule(baseline=0.2, learning=0.1)
     assert str(caught.value) == (
-        "practice and learning of 0.2 + 0.1 s are too short for a stride; "
+        "learning and learning of 0.2 + 0.1 s are too short for a stride; "
         "make them 1 s or more together"
     )
 
@@ -176,7 +176,7 @@ def test_without_start_up_and_practice_the_robots_learn_from_the_first_stride_on
     simulation: Callable[..., Simulation],
 ) -> None:
     learner = simulation(ControllerSpec("mine", law=load_controller("ilc").law))
-    learner.schedule = Schedule(startup=0.0, practice=0.0, learning=1.5)
+    learner.schedule = Schedule(startup=0.0, baseline=0.0, learning=1.5)
     log = learner.run()
     for learning in finished(log, "learning"):
         assert np.all(learning[1:] == 1.0)
@@ -189,7 +189,7 @@ def test_many_ticks_at_once_and_tick_by_tick_give_the_same_motion_over_three_sec
     robot: Robot, gaits: list[Gait], name: str, scenario: str
 ) -> None:
     world = load_scenario(scenario)
-    one, other = (practised(robot, gaits, name, world, chunked=way) for way in (True, False))
+    one, other = (learned_strides(robot, gaits, name, world, chunked=way) for way in (True, False))
     assert_same_motion(one, other)
 
 
@@ -198,7 +198,9 @@ def test_threads_that_share_the_robots_give_the_same_motion(
     robot: Robot, gaits: list[Gait], scenario: str
 ) -> None:
     world = load_scenario(scenario)
-    one, other = (practised(robot, gaits, "ilc", world, threads=threads) for threads in (1, 2))
+    one, other = (
+        learned_strides(robot, gaits, "ilc", world, threads=threads) for threads in (1, 2)
+    )
     assert_same_motion(one, other)
 
 
@@ -219,7 +221,7 @@ def test_threads_need_a_locked_base(
         )
 
 
-def practised(
+def learned_strides(
     robot: Robot,
     gaits: list[Gait],
     name: str,
@@ -234,7 +236,7 @@ def practised(
         gaits,
         load_controller(name),
         world,
-        schedule=Schedule(practice=1.5, learning=1.5),
+        schedule=Schedule(baseline=1.5, learning=1.5),
         rng=np.random.default_rng(0),
         chunked=chunked,
         threads=threads,

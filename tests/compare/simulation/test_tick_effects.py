@@ -26,7 +26,7 @@ def build(robot: Robot, gaits: list[Gait]) -> Build:
             gaits,
             load_controller(controller),
             scenario,
-            schedule=Schedule(**{"startup": 0.2, "practice": 1.2, "learning": 0.0, **times}),
+            schedule=Schedule(**{"startup": 0.2, "baseline": 1.2, "learning": 0.0, **times}),
             rng=np.random.default_rng(0),
         )
 
@@ -144,7 +144,7 @@ def test_what_is_kept_of_a_robot_with_biased_encoders_is_the_truth(build: Build)
     simulation = build(biased)
     simulation.run()
     bias = simulation.player.sensors._encoder_bias
-    believed, true = simulation.player.seen.joints, simulation.player.log.joints
+    believed, true = simulation.player.sensed.joints, simulation.player.log.joints
     ticks = slice(simulation.controller.spec.touchdown_ticks, 50)
     np.testing.assert_allclose(
         (believed - true)[:, ticks], np.broadcast_to(bias[:, None], true[:, ticks].shape)

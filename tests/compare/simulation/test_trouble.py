@@ -16,10 +16,10 @@ from pronk_pin.robot import Robot
 
 NOMINAL = load_scenario("nominal")
 LATE = replace(NOMINAL, full_torque_speed=500.0, no_load_speed=1000.0)
-"""The nominal world, played tick by tick, so that sensors can be made to fail."""
+"""The nominal scenario, played tick by tick, so that sensors can be made to fail."""
 
 Build = Callable[..., Simulation]
-PRACTICE, LEARNING = 2.0, 8.0
+BASELINE, LEARNING = 2.0, 8.0
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def build(robot: Robot, gaits: list[Gait]) -> Build:
             gaits,
             load_controller("ilc"),
             scenario,
-            schedule=Schedule(startup=0.2, practice=PRACTICE, learning=LEARNING),
+            schedule=Schedule(startup=0.2, baseline=BASELINE, learning=LEARNING),
             rng=np.random.default_rng(0),
         )
 
@@ -39,7 +39,7 @@ def build(robot: Robot, gaits: list[Gait]) -> Build:
 
 @pytest.fixture(scope="module")
 def undisturbed(build: Build) -> Simulation:
-    """A practice in which nothing goes wrong."""
+    """A learning run in which nothing goes wrong."""
     simulation = build(NOMINAL)
     simulation.run()
     return simulation

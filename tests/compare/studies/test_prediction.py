@@ -16,8 +16,8 @@ from pronk_pin.compare.studies.prediction import (
     Prediction,
     compare_prediction,
     describe_prediction,
-    practise,
-    stored_practice,
+    simulate_learning,
+    stored_learning,
 )
 from pronk_pin.compare.world.scenario import load_scenario
 from pronk_pin.control import load_controller
@@ -31,7 +31,7 @@ SPEEDS = load_library("a1").speeds
 
 def predictions(name: str, speeds: Sequence[float]) -> list[Prediction]:
     spec = load_controller(name)
-    strides = practise(spec, speeds, NOMINAL, robot="a1", strides=20)
+    strides = simulate_learning(spec, speeds, NOMINAL, robot="a1", strides=20)
     return [compare_prediction(spec, strides, v, NOMINAL, number=20) for v in speeds]
 
 
@@ -60,7 +60,9 @@ def test_the_rehearsal_predicts_the_norm_optimal_law_within_a_factor_of_1_5() ->
 def test_the_norm_optimal_law_tracks_better_than_the_pd_type_law_within_five_strides() -> None:
     left = {}
     for name in ("ilc", NORM_OPTIMAL):
-        strides = practise(load_controller(name), [0.0, 0.8], NOMINAL, robot="a1", strides=12)
+        strides = simulate_learning(
+            load_controller(name), [0.0, 0.8], NOMINAL, robot="a1", strides=12
+        )
         rms = np.sqrt((strides["rms_error"].sel(joint=["FL_calf", "FL_thigh"]) ** 2).mean("joint"))
         first = int(np.argmax(strides["learning"].isel(speed=0).to_numpy() == 1))
         left[name] = rms.to_numpy()[:, first + 5]
@@ -72,7 +74,7 @@ def stance_only(tmp_path_factory: pytest.TempPathFactory) -> Results:
     experiment = Experiment(
         speeds=(0.0, 0.2),
         controllers=("ilc", "ilc-stance", NORM_OPTIMAL),
-        schedule=Schedule(practice=4.0, learning=6.0),
+        schedule=Schedule(baseline=4.0, learning=6.0),
     )
     folder = tmp_path_factory.mktemp("stance") / "result"
     return run_experiment(experiment, folder, workers=1, progress=False)
@@ -81,8 +83,8 @@ def stance_only(tmp_path_factory: pytest.TempPathFactory) -> Results:
 def test_a_stored_practice_is_predicted_as_one_that_was_made_for_it(stance_only: Results) -> None:
     """They differ in how long PD went before."""
     spec = load_controller("ilc-stance")
-    stored = stored_practice(stance_only, spec, [0.2], NOMINAL)
-    made = practise(spec, [0.2], NOMINAL, robot="a1", strides=10)
+    stored = stored_learning(stance_only, spec, [0.2], NOMINAL)
+    made = simulate_learning(spec, [0.2], NOMINAL, robot="a1", strides=10)
     one, other = (compare_prediction(spec, s, 0.2, NOMINAL, number=10) for s in (stored, made))
     np.testing.assert_allclose(one.measured[:5], other.measured[:5], rtol=0.05)
     np.testing.assert_allclose(one.predicted[:5], other.predicted[:5], rtol=0.05)
@@ -93,22 +95,22 @@ def test_what_also_learned_in_flight_is_not_laid_over_a_prediction_of_the_stance
     stance_only: Results, comparison: Results
 ) -> None:
     with pytest.raises(InvalidInput, match=f"choose ilc-stance or {NORM_OPTIMAL}, which this"):
-        stored_practice(stance_only, load_controller("ilc"), [0.0], NOMINAL)
+        stored_learning(stance_only, load_controller("ilc"), [0.0], NOMINAL)
     with pytest.raises(InvalidInput, match="make a result with 'pronk-pin compare --controllers"):
-        stored_practice(comparison, load_controller("ilc"), [0.0], NOMINAL)
+        stored_learning(comparison, load_controller("ilc"), [0.0], NOMINAL)
     with pytest.raises(InvalidInput, match="does not learn in stance"):
-        stored_practice(comparison, load_controller("pd"), [0.0], NOMINAL)
+        stored_learning(comparison, load_controller("pd"), [0.0], NOMINAL)
 
 
 def test_only_speeds_and_worlds_of_the_result_are_predicted(stance_only: Results) -> None:
     spec = load_controller("ilc-stance")
     with pytest.raises(InvalidInput, match=r"no speed 0.1 m/s; choose from 0, 0.2"):
-        stored_practice(stance_only, spec, [0.0, 0.1], NOMINAL)
+        stored_learning(stance_only, spec, [0.0, 0.1], NOMINAL)
     with pytest.raises(InvalidInput, match="no 'ilc-stance' in scenario 'payload'"):
-        stored_practice(stance_only, spec, [0.0], load_scenario("payload"))
+        stored_learning(stance_only, spec, [0.0], load_scenario("payload"))
     free = replace(stance_only.experiment, base="sagittal", controllers=("ilc-stance",))
     with pytest.raises(InvalidInput, match="with --base locked"):
-        stored_practice(replace(stance_only, experiment=free), spec, [0.0], NOMINAL)
+        stored_learning(replace(stance_only, experiment=free), spec, [0.0], NOMINAL)
 
 
 def test_analyze_draws_what_was_measured_over_what_was_predicted(

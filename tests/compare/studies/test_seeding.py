@@ -81,7 +81,7 @@ def test_the_library_seeds_the_learning_that_goes_on_from_it() -> None:
     experiment = Experiment(
         speeds=(0.2,),
         controllers=("library", "library+ilc"),
-        schedule=Schedule(startup=0.1, practice=1.0, learning=1.0),
+        schedule=Schedule(startup=0.1, baseline=1.0, learning=1.0),
     )
     cells = {cell.controller: cell for cell in experiment.cells()}
     practised = run_cell(cells["ilc"])

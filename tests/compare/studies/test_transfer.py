@@ -1,4 +1,4 @@
-"""When a stored skill may be reused."""
+"""When stored feedforward may be reused."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def test_a_skill_is_reused_where_it_tracks_nearly_as_at_home() -> None:
 
 
 def excess(table: pd.DataFrame) -> pd.Series:
-    """RMS over thigh and calf of the stored skill, over that of practice there."""
+    """RMS over thigh and calf of the stored feedforward, over that of learning there."""
     stored, practised = (
-        (table[f"thigh{of}"] ** 2 + table[f"calf{of}"] ** 2) ** 0.5 for of in ("", "_practised")
+        (table[f"thigh{of}"] ** 2 + table[f"calf{of}"] ** 2) ** 0.5 for of in ("", "_needed")
     )
     return stored / practised
 
@@ -43,7 +43,7 @@ def test_the_rule_lets_no_skill_be_reused_that_practice_would_better() -> None:
     assert not answers["left out -0.20 m/s"]
     for speed in (0.2, 0.4, 0.6):
         assert answers[f"left out {speed:+.2f} m/s"]
-    assert (~table["right"]).sum() <= 1  # practice asked for in vain
+    assert (~table["right"]).sum() <= 1  # learning asked for in vain
 
 
 @pytest.mark.slow
@@ -54,7 +54,7 @@ def test_the_rule_lets_no_skill_be_reused_that_practice_would_better() -> None:
 def test_the_rule_misses_nothing_where_it_was_not_found(
     robot: str, world: str, offset: float
 ) -> None:
-    """At the speeds between, in other worlds of practice, and for another robot."""
+    """At the speeds between, in other scenarios of learning, and for another robot."""
     speeds = np.round(offset + np.arange(-0.4, 0.7, 0.2), 1)
     table = measure_transfers(
         load_controller("ilc"), speeds.tolist(), load_scenario(world), [], robot=robot

@@ -9,7 +9,7 @@ import pytest
 from pronk_pin.compare import Sensors, SensorSuite, World, load_scenario
 from pronk_pin.compare.world.imu import InertialUnit
 from pronk_pin.compare.world.mismatch import NOISE
-from pronk_pin.control import AttitudeEstimator, AttitudeFilter, TrunkKnown, attitude_angle
+from pronk_pin.control import AttitudeEstimator, AttitudeFilter, TrunkEstimate, attitude_angle
 from pronk_pin.robot import Robot
 from pronk_pin.robot.conventions import rotation_matrix
 
@@ -18,7 +18,7 @@ ROWS = np.arange(N)
 PITCH = -0.2
 
 
-def unit(robot: Robot, sensors: Sensors | None = None) -> tuple[World, Callable[[], TrunkKnown]]:
+def unit(robot: Robot, sensors: Sensors | None = None) -> tuple[World, Callable[[], TrunkEstimate]]:
     """Robots in the air, pitched, and what they know by their IMUs; they know the pitch."""
     world = World(robot, load_scenario("ideal"), N, base="free")
     world.reset(np.tile([0.0, 2.0], (N, 1)), np.tile(robot.standing[7:], (N, 1)), pitch=PITCH)
@@ -28,7 +28,7 @@ def unit(robot: Robot, sensors: Sensors | None = None) -> tuple[World, Callable[
     at_rest = imu.at_rest(spec.rest)
     estimator = AttitudeEstimator(spec, attitude, at_rest, timestep=0.001, gravity=9.81)
 
-    def read() -> TrunkKnown:
+    def read() -> TrunkEstimate:
         gyro, force = imu.read(ROWS)
         estimator.update(ROWS, gyro, force)
         return estimator.trunk(ROWS, force)

@@ -1,4 +1,4 @@
-"""Practice in worlds that differ from the model in one thing each."""
+"""Learning in worlds that differ from the model in one thing each."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from pronk_pin.robot import Robot
 LAST = 5
 
 
-def practise(
+def simulate_learning(
     robot: Robot,
     controller: str | ControllerSpec,
     scenario: str | Scenario,
     speeds: Sequence[float],
     learning: float = 12.0,
 ) -> Simulation:
-    """A practice that has been run."""
+    """A learning run that has been run."""
     world = load_scenario(scenario) if isinstance(scenario, str) else scenario
     spec = load_controller(controller) if isinstance(controller, str) else controller
     simulation = Simulation(
@@ -53,13 +53,13 @@ def peaks(simulation: Simulation) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("scenario", ["delay", "soft-ground"])
 def test_the_hard_worlds_are_learned_at_one_speed(robot: Robot, scenario: str) -> None:
-    before, after = peaks(practise(robot, "ilc", scenario, (0.0,)))
+    before, after = peaks(simulate_learning(robot, "ilc", scenario, (0.0,)))
     assert np.all(after < 0.25 * before)
 
 
 def test_with_a_delay_it_is_the_flights_timing_that_helps(robot: Robot) -> None:
     """Motors that act 4 ms late push 4 ms longer, and the flight ends later than planned."""
-    practised = practise(robot, "ilc", "delay", (0.0,))
+    practised = simulate_learning(robot, "ilc", "delay", (0.0,))
     flight = practised.strides.scalars["duration"] - practised.strides.scalars["stance"]
     planned = load_library("a1").at(0.0).flight.duration
     last = int(practised.strides.count[0]) - 1
@@ -71,7 +71,7 @@ def test_with_a_delay_it_is_the_flights_timing_that_helps(robot: Robot) -> None:
 def test_practice_takes_away_three_quarters_of_the_error_in_every_world(
     robot: Robot, scenario: str
 ) -> None:
-    simulation = practise(robot, "ilc", scenario, Experiment().speeds)
+    simulation = simulate_learning(robot, "ilc", scenario, Experiment().speeds)
     before, after = peaks(simulation)
     assert np.all(after < 0.25 * before)
     assert simulation.upright.all()
@@ -84,7 +84,7 @@ def test_an_imu_and_odometry_do_nearly_as_well_as_true_states(robot: Robot) -> N
     noise = replace(noise, sensors=replace(noise.sensors, encoder_bias=0.0))
     speeds = load_library("a1").speeds
     left = [
-        peaks(practise(robot, controller, scenario, speeds, learning=20.0))[1]
+        peaks(simulate_learning(robot, controller, scenario, speeds, learning=20.0))[1]
         for controller, scenario in (("ilc-imu", noise), ("ilc", "nominal"))
     ]
     assert np.all(left[0] < 1.2 * left[1])

@@ -213,7 +213,7 @@ SMALL = Experiment(
     speeds=(0.0,),
     controllers=("pd", "ilc"),
     scenarios=("ideal",),
-    schedule=Schedule(startup=0.1, practice=1.0, learning=1.0),
+    schedule=Schedule(startup=0.1, baseline=1.0, learning=1.0),
 )
 
 
@@ -221,13 +221,13 @@ SMALL = Experiment(
 def run(robot: Robot, tmp_path: Path) -> Results:
     """A small comparison in the world of an MJCF."""
     path = mjcf(robot, tmp_path / "robot.xml")
-    return run_experiment(replace(SMALL, world=str(path)), tmp_path / "run", progress=False)
+    return run_experiment(replace(SMALL, mjcf=str(path)), tmp_path / "run", progress=False)
 
 
 def test_a_result_keeps_what_the_file_had_otherwise_and_is_read_without_it(
     robot: Robot, run: Results
 ) -> None:
-    path = Path(run.experiment.world)
+    path = Path(run.experiment.mjcf)
     parity = mjcf_parity(robot, path)
     path.unlink()
     results = Results.load(run.folder)
@@ -239,7 +239,7 @@ def test_a_result_keeps_what_the_file_had_otherwise_and_is_read_without_it(
 
 
 def test_a_result_is_completed_with_the_same_file_and_no_other(robot: Robot, run: Results) -> None:
-    path, cell = Path(run.experiment.world), run.find(controller="pd")
+    path, cell = Path(run.experiment.mjcf), run.find(controller="pd")
     strides = run.path(cell).read_bytes()
     run.path(cell).unlink()
     as_it_was = path.read_text()
@@ -257,7 +257,7 @@ def test_a_result_is_completed_with_the_same_file_and_no_other(robot: Robot, run
 
 def test_a_file_that_cannot_be_taken_leaves_no_folder(robot: Robot, tmp_path: Path) -> None:
     path = tmp_path / "robot.xml"
-    experiment = replace(SMALL, world=str(path))
+    experiment = replace(SMALL, mjcf=str(path))
     with pytest.raises(FileProblem, match=r"robot.xml: missing"):
         run_experiment(experiment, tmp_path / "run", progress=False)
     mjcf(load_robot("solo12"), path)

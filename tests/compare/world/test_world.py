@@ -24,7 +24,7 @@ IDEAL = load_scenario("ideal")
 LOADED = replace(IDEAL, name="loaded", payload=3.0, payload_position=(0.1, -0.03, 0.08))
 HIGH = replace(LOADED, name="high", payload_position=(-0.02, 0.02, 0.5))  # turns the axes over
 SHIFTED = replace(LOADED, name="shifted", com_shift=(0.03, 0.01, -0.02))
-GUIDED = [0, 2, *range(6, 18)]  # what the locked base leaves free
+PLANAR = [0, 2, *range(6, 18)]  # what the locked base leaves free
 
 
 def loaded_model(robot: Robot, scenario: Scenario) -> pin.Model:
@@ -142,8 +142,8 @@ def test_each_motor_accelerates_the_guided_robot_as_pinocchio_says(
 
     force = -np.tile(nonlinear_effects(robot, robot.standing, np.zeros(18)), (12, 1))
     force[:, 6:] += torque_constant * 4.0 * np.eye(12)
-    mass = mass_matrix(robot, robot.standing)[np.ix_(GUIDED, GUIDED)]
-    expected = np.linalg.solve(mass, force[:, GUIDED].T).T
+    mass = mass_matrix(robot, robot.standing)[np.ix_(PLANAR, PLANAR)]
+    expected = np.linalg.solve(mass, force[:, PLANAR].T).T
     measured = np.hstack([world.base_rate, world.joint_rates]) / IDEAL.timestep
     np.testing.assert_allclose(measured, expected, rtol=1e-6, atol=1e-6)
 
@@ -227,10 +227,10 @@ def test_viscous_friction_slows_the_joints_as_pinocchio_says(robot: Robot) -> No
     world.step(np.zeros((1, 12)))
 
     v = np.zeros(18)
-    v[GUIDED] = before
+    v[PLANAR] = before
     friction = np.diag([0.0, 0.0, *[damping] * 12])
-    force = -nonlinear_effects(robot, robot.standing, v)[GUIDED] - friction @ before
-    mass = mass_matrix(robot, robot.standing)[np.ix_(GUIDED, GUIDED)]
+    force = -nonlinear_effects(robot, robot.standing, v)[PLANAR] - friction @ before
+    mass = mass_matrix(robot, robot.standing)[np.ix_(PLANAR, PLANAR)]
     expected = np.linalg.solve(mass + dt * friction, force)
     measured = (np.hstack([world.base_rate, world.joint_rates])[0] - before) / dt
     np.testing.assert_allclose(measured, expected, rtol=1e-6, atol=1e-6)

@@ -41,7 +41,7 @@ def stride(feedforward: Array) -> StrideRecord:
     return StrideRecord.of(error, np.zeros(SHAPE), KP * error, feedforward)
 
 
-def practise(law: LearningLaw, strides: int) -> Array:
+def simulate_learning(law: LearningLaw, strides: int) -> Array:
     """Errors before each of some strides, over the error without feedforward; shape (strides,)."""
     record, shares = stride(np.zeros(SHAPE)), []
     for _ in range(strides):
@@ -52,27 +52,27 @@ def practise(law: LearningLaw, strides: int) -> Array:
 
 @pytest.mark.parametrize("gain", [0.15, 0.5, 1.0, 1.5])
 def test_without_forgetting_each_stride_leaves_one_minus_the_gain_of_the_error(gain: float) -> None:
-    shares = practise(PDTypeILC(gain=gain, leak=0.0), 8)
+    shares = simulate_learning(PDTypeILC(gain=gain, leak=0.0), 8)
     np.testing.assert_allclose(shares, (1.0 - gain) ** np.arange(8), atol=1e-6)
 
 
 def test_forgetting_leaves_the_predicted_error() -> None:
     gain, leak = 0.3, 0.1
-    shares = practise(PDTypeILC(gain=gain, leak=leak), 60)
+    shares = simulate_learning(PDTypeILC(gain=gain, leak=leak), 60)
     assert shares[-1] == pytest.approx(leak / (gain + leak), rel=1e-6)
 
 
 def test_the_default_law_keeps_six_percent_of_a_steady_error_within_8_strides() -> None:
-    assert practise(PDTypeILC(), 9)[8] < 0.06
+    assert simulate_learning(PDTypeILC(), 9)[8] < 0.06
 
 
 def test_the_papers_law_with_an_exact_filter_only_turns_the_error_around() -> None:
-    shares = practise(PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1)), 9)
+    shares = simulate_learning(PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1)), 9)
     np.testing.assert_allclose(shares, (-1.0) ** np.arange(9), atol=1e-5)
 
 
 def test_the_printed_filter_holds_the_papers_law_at_78_percent_reduction() -> None:
-    shares = practise(PaperILC(), 60)
+    shares = simulate_learning(PaperILC(), 60)
     assert np.all(np.abs(shares[1:]) < 1.0)
     # Fixed point of ff <- 0.64 (2 d - ff).
     assert shares[-1] == pytest.approx(1.0 - 1.28 / 1.64, abs=1e-6)
@@ -120,7 +120,7 @@ def toy(rng: np.random.Generator) -> LiftedModel:
 def errors(law: ModelBasedILC, model: LiftedModel, strides: int) -> Array:
     """Norms of the error of the toy's strides, the first without feedforward."""
     begin = record = model.planned
-    bound, norms = law.along([model]), [np.linalg.norm(begin.error)]
+    bound, norms = law.bind([model]), [np.linalg.norm(begin.error)]
     for _ in range(strides):
         record = model.stride(bound.update(record), begin, np.zeros((1, 0)))
         norms.append(np.linalg.norm(record.error))
@@ -135,7 +135,7 @@ def test_plant_inversion_needs_one_stride_where_the_model_is_right() -> None:
 
 def test_plant_inversion_diverges_where_the_plant_is_more_than_twice_the_model() -> None:
     model = toy(np.random.default_rng(0))
-    law = PlantInversionILC(gain=1.0, cutoff=1e-6, splines=None, horizon=1).along([model])
+    law = PlantInversionILC(gain=1.0, cutoff=1e-6, splines=None, horizon=1).bind([model])
     for factor, grows in ((1.9, False), (2.1, True)):
         plant = model.scaled(factor)
         begin = plant.planned
@@ -156,19 +156,19 @@ def test_the_norm_optimal_law_converges_monotonically() -> None:
 def test_the_norm_optimal_law_minimises_what_it_says() -> None:
     model, change, effort = toy(np.random.default_rng(2)), 0.3, 0.2
     begin = model.planned
-    law = NormOptimalILC(change=change, effort=effort, splines=None, horizon=1).along([model])
+    law = NormOptimalILC(change=change, effort=effort, splines=None, horizon=1).bind([model])
     u = law.update(begin).reshape(-1)
     gradient = -model.angle.T @ (begin.error.reshape(-1) - model.angle @ u) + (change + effort) * u
     np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
 
 
 def test_a_model_based_law_without_its_models_says_what_to_do() -> None:
-    with pytest.raises(InvalidInput, match=r"give it theirs by `along\(models\)`"):
+    with pytest.raises(InvalidInput, match=r"give it theirs by `bind\(models\)`"):
         NormOptimalILC().update(toy(np.random.default_rng(0)).planned)
 
 
 def test_the_current_iteration_law_takes_over_what_the_feedback_did() -> None:
-    shares = practise(CurrentIterationILC(gain=0.5, leak=0.0), 6)
+    shares = simulate_learning(CurrentIterationILC(gain=0.5, leak=0.0), 6)
     np.testing.assert_allclose(shares, 0.5 ** np.arange(6), atol=1e-6)
 
 
@@ -186,8 +186,8 @@ def carried(rng: np.random.Generator) -> LiftedModel:
         own,
         angle_start=1.5 * own.angle,
         rate_start=np.zeros_like(own.angle),
-        carry=np.zeros_like(own.angle),
-        push=np.eye(TOY),
+        A=np.zeros_like(own.angle),
+        B=np.eye(TOY),
     )
 
 
@@ -195,7 +195,7 @@ def test_only_a_law_that_looks_ahead_is_stable_where_the_touchdown_outdoes_the_s
     model = carried(np.random.default_rng(4))
     begin, left = model.planned, {}
     for horizon in (1, 4):
-        law = NormOptimalILC(change=0.01, splines=None, horizon=horizon).along([model])
+        law = NormOptimalILC(change=0.01, splines=None, horizon=horizon).bind([model])
         record, state = begin, np.zeros((1, TOY))
         for _ in range(20):
             learned = law.update(record)
@@ -212,7 +212,7 @@ def test_a_feedforward_of_splines_has_no_chatter() -> None:
     model = LiftedModel.with_resets(
         answer, np.zeros_like(answer), gains=Gains(), torque=rng.normal(size=(SAMPLES, 3))
     )
-    learned = NormOptimalILC().along([model]).update(model.planned)[0, :, 0]
+    learned = NormOptimalILC().bind([model]).update(model.planned)[0, :, 0]
     power = np.abs(np.fft.rfft(learned)) ** 2
     assert power[16:].sum() < 0.01 * power.sum()
 

@@ -29,7 +29,7 @@ def test_speeds_between_get_a_mixture_of_their_neighbours(learned: TorqueLibrary
 
 def test_flights_last_as_long_as_at_the_nearest_practised_speed(learned: TorqueLibrary) -> None:
     wanted = np.array([0.3, -0.1, 0.1, 0.2, 0.15])
-    skill = learned.skill(wanted)
+    skill = learned.initial_feedforward(wanted)
     np.testing.assert_array_equal(skill.flight, [0.23, 0.19, 0.2, 0.23, 0.2])
     np.testing.assert_array_equal(skill.feedforward, learned.at(wanted))
 

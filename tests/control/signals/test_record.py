@@ -31,7 +31,7 @@ def test_resampling_holds_the_ends_and_a_single_sample() -> None:
 def late() -> PhaseLog:
     """Two robots whose phases were felt to begin at tick 2, for 100 and for 80 ticks."""
     values = np.zeros((2, 120, 12))
-    return PhaseLog(values, values, values, values, values, np.array([100, 80]), felt=2)
+    return PhaseLog(values, values, values, values, values, np.array([100, 80]), sensed=2)
 
 
 def test_phases_are_found_at_their_ticks_and_held_at_the_measured_ends(late: PhaseLog) -> None:

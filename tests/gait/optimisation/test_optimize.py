@@ -119,7 +119,8 @@ def test_a_pitching_trunk_has_no_moment_about_its_pitch_axis(robot: Robot) -> No
     found = optimize_gait(problem)
     report = audit(found, refine=False)
     assert report["18-DoF residual"].value < 1e-8
-    # All that the guide still takes is what the trunk's centre of mass lies off the mirror plane.
+    # All that the planar constraint still takes is what the trunk's centre of mass lies off the
+    # mirror plane.
     assert report["guide"].value < 1.0
     pitch = [2 * np.arcsin(motion.q[:, 4]) for motion in found.motions.values()]
     assert 0.1 < np.max(np.abs(np.concatenate(pitch))) <= problem.pitch_limit + 1e-8
@@ -131,10 +132,10 @@ def test_an_impossible_gait_names_what_fights(robot: Robot) -> None:
         optimize_gait(problem)
     assert max(caught.value.violations.values()) > TOLERANCE
     # The torque limits are 3.35 N m; a gait of this cost uses about 4 N m.
-    assert caught.value.fights is not None
-    assert list(caught.value.fights) == ["torque limits"]
+    assert caught.value.conflicts is not None
+    assert list(caught.value.conflicts) == ["torque limits"]
     assert "raise torque_use" in str(caught.value)
-    enough = problem.torque_use * robot.tau_max[0] + caught.value.fights["torque limits"]
+    enough = problem.torque_use * robot.tau_max[0] + caught.value.conflicts["torque limits"]
     optimize_gait(dataclasses.replace(problem, torque_use=1.02 * enough / robot.tau_max[0]))
 
 

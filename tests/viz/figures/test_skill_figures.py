@@ -1,4 +1,4 @@
-"""Figures of what a learned skill is good for show every number of their tables."""
+"""Figures of what learned feedforward is good for show every number of their tables."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def transfers() -> pd.DataFrame:
             "task": ["at home", "left out +0.20 m/s", "payload"],
             "thigh": [0.003, 0.004, 0.02],
             "calf": [0.004, 0.006, 0.03],
-            "thigh_practised": [0.003, 0.0039, 0.004],
-            "calf_practised": [0.004, 0.005, 0.006],
+            "thigh_relearned": [0.003, 0.0039, 0.004],
+            "calf_relearned": [0.004, 0.005, 0.006],
             "reuse": [True, False, False],
             "right": [True, False, True],
         }
@@ -58,9 +58,9 @@ def test_the_transfer_figure_tells_the_rules_answer_and_where_it_was_wrong(
         str(line.get_label()): np.column_stack(line.get_data()).tolist()
         for line in figure.axes[1].lines
     }
-    assert points["stored skill: reuse"] == [[0.003, 0]]
-    assert points["stored skill: practise again"] == [[0.004, 1], [0.02, 2]]
-    assert points["practised there"] == [[0.003, 0], [0.0039, 1], [0.004, 2]]
+    assert points["stored feedforward: reuse"] == [[0.003, 0]]
+    assert points["stored feedforward: learn again"] == [[0.004, 1], [0.02, 2]]
+    assert points["learned there"] == [[0.003, 0], [0.0039, 1], [0.004, 2]]
     assert figure_bytes(figure, "svg") == figure_bytes(transfers_figure(transfers), "svg")
 
 

@@ -21,7 +21,7 @@ import pytest
 from tornado.websocket import websocket_connect
 
 from pronk_pin.errors import InvalidInput, PortUnavailable, PronkError
-from pronk_pin.viz import Programme, Scene, Track, serve
+from pronk_pin.viz import Menu, Scene, Track, serve
 from pronk_pin.viz.player.browser import Browser
 from pronk_pin.viz.player.hosts import Hosts
 from pronk_pin.viz.player.live import LiveServer
@@ -117,8 +117,8 @@ def test_the_page_its_parts_and_its_films_come_from_the_server(scene: Scene) -> 
 
 
 def test_a_choice_that_does_not_exist_is_told(scene: Scene) -> None:
-    programme = Programme(lambda choice: scene, {"speed": ["1", "2"]}, {"speed": "1"})
-    with LiveServer(programme) as server:
+    menu = Menu(lambda choice: scene, {"speed": ["1", "2"]}, {"speed": "1"})
+    with LiveServer(menu) as server:
         assert get(f"{server.url}film?speed=2") == film_blob(scene)
         with pytest.raises(urllib.error.HTTPError) as caught:
             get(f"{server.url}film?speed=3")

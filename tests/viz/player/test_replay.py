@@ -16,14 +16,14 @@ import pytest
 
 from pronk_pin.errors import FileProblem, InvalidInput
 from pronk_pin.robot import Robot
-from pronk_pin.viz import Programme, Scene, Track, write_replay
+from pronk_pin.viz import Menu, Scene, Track, write_replay
 from pronk_pin.viz.player import replay as module
 
 if TYPE_CHECKING:
     from conftest import Eye
 
 
-def by_color(scene: Scene) -> Programme:
+def by_color(scene: Scene) -> Menu:
     """The hop in two colours, of which the file holds both."""
 
     def make(choice: Mapping[str, str]) -> Scene:
@@ -32,7 +32,7 @@ def by_color(scene: Scene) -> Programme:
 
     options = {"paint": ["plain", "red"], "other": ["one", "two"]}
     filed = {"paint": options["paint"]}
-    return Programme(make, options, {"paint": "plain", "other": "one"}, filed)
+    return Menu(make, options, {"paint": "plain", "other": "one"}, filed)
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +118,8 @@ def test_a_file_that_would_grow_too_large_leaves_choices_out(
 
 
 def test_no_text_ends_the_script(scene: Scene, tmp_path: Path) -> None:
-    programme = Programme(lambda choice: scene, {"</script>": ["a"]}, {"</script>": "a"})
-    text = write_replay(programme, tmp_path / "hop.html", fps=5.0).read_text()
+    menu = Menu(lambda choice: scene, {"</script>": ["a"]}, {"</script>": "a"})
+    text = write_replay(menu, tmp_path / "hop.html", fps=5.0).read_text()
     assert len(re.findall("</script>", text)) == 3
 
 

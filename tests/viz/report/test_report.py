@@ -29,7 +29,7 @@ EXPERIMENT = Experiment(
     speeds=(0.0, 0.4),
     controllers=("pd", "ilc", "model", "ilc-zero"),
     scenarios=("nominal", "payload"),
-    schedule=Schedule(startup=0.2, practice=6.0, learning=4.0),
+    schedule=Schedule(startup=0.2, baseline=6.0, learning=4.0),
 )
 
 
@@ -43,11 +43,11 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Results:
 
 def test_the_report_answers_first_and_says_where_its_numbers_are_from(result: Results) -> None:
     text = (result.folder / "report.html").read_text()
-    assert text.index("Does practice beat the model? In 2 worlds") < text.index("<nav>")
-    for anchor in ("worlds", "nominal", "payload", "statistics", "limits", "provenance"):
+    assert text.index("Does practice beat the model? In 2 scenarios") < text.index("<nav>")
+    for anchor in ("scenarios", "nominal", "payload", "statistics", "limits", "provenance"):
         assert f'id="{anchor}"' in text
         assert f'href="#{anchor}"' in text
-    for known in ("mujoco 4", "BCa", "figure-heat-map", "figure-practice-calf"):
+    for known in ("mujoco 4", "BCa", "figure-heat-map", "figure-learning-calf"):
         assert known in text
     assert "nan" not in re.sub(r"data:image[^\"]*|provenance", "", text)
 
@@ -177,8 +177,8 @@ def test_the_report_holds_the_parity_table_of_another_robots_mjcf(
     spec.compile()
     path = tmp_path / "my robot.xml"
     path.write_text(spec.to_xml())
-    small = replace(EXPERIMENT, controllers=("pd", "ilc"), scenarios=("ideal",), world=str(path))
-    small = replace(small, schedule=Schedule(startup=0.2, practice=2.0, learning=2.0))
+    small = replace(EXPERIMENT, controllers=("pd", "ilc"), scenarios=("ideal",), mjcf=str(path))
+    small = replace(small, schedule=Schedule(startup=0.2, baseline=2.0, learning=2.0))
     results = run_experiment(small, tmp_path / "result", workers=1, progress=False)
     path.unlink()  # what the report needs is in the folder
     write_report(Results.load(results.folder))
@@ -190,7 +190,7 @@ def test_the_report_holds_the_parity_table_of_another_robots_mjcf(
     page = (results.folder / "report.html").read_text()
     for known in ('id="parity"', "my robot.xml", f"<td>{robot.mass + 1.0:.4f}</td>", "kp 100"):
         assert known in page
-    assert f"--world {shlex.quote(str(path))}" in command(results)
+    assert f"--mjcf {shlex.quote(str(path))}" in command(results)
 
 
 def test_a_command_of_many_lines_can_be_pasted(result: Results) -> None:
@@ -208,18 +208,18 @@ def test_sampled_worlds_are_one_family_and_each_has_its_line(tmp_path: Path) -> 
         speeds=(0.2,),
         controllers=("pd", "ilc", "model"),
         scenarios=names,
-        schedule=Schedule(startup=0.2, practice=2.0, learning=2.0),
+        schedule=Schedule(startup=0.2, baseline=2.0, learning=2.0),
     )
     results = run_experiment(experiment, tmp_path / "result", workers=1, progress=False)
     write_report(results)
     text = (results.folder / "report.md").read_text()
-    assert "> In 5 sampled worlds, at 1 speed in each, practice cuts the mean peak error" in text
-    assert 'Controllers in the 5 sampled worlds "random-2"' in text
-    assert "Intervals are drawn over the worlds." in text
+    assert "> In 5 sampled scenarios, at 1 speed in each, learning cuts the mean peak error" in text
+    assert 'Controllers in the 5 sampled scenarios "random-2"' in text
+    assert "Intervals are drawn over the scenarios." in text
     assert "of the 6 mean errors here" in text
     for name in names:
         assert re.search(rf"^\| {name} \| \d", text, re.MULTILINE)
-    for figure in ("random-2-by-world", "practice-calf", "practice-thigh"):
+    for figure in ("random-2-by-world", "learning-calf", "learning-thigh"):
         assert (results.folder / "figures" / f"{figure}.svg").stat().st_size > 1000
     assert not re.search(r"\bnan\b", text)
     written = {path.name for path in write_figures(results, tmp_path / "figures")}

@@ -19,13 +19,13 @@ from pronk_pin.control import SKIPPED
 from pronk_pin.errors import InvalidInput
 from pronk_pin.viz import write_replay
 from pronk_pin.viz.report import write_report
-from pronk_pin.viz.scenes.stride_scenes import practice_programme
+from pronk_pin.viz.scenes.stride_scenes import result_menu
 
 EXPERIMENT = Experiment(
     speeds=(0.0, 0.3),
     controllers=("pd", "ilc", "model"),
     scenarios=("nominal", "payload"),
-    schedule=Schedule(startup=0.2, practice=2.0, learning=2.0),
+    schedule=Schedule(startup=0.2, baseline=2.0, learning=2.0),
 )
 
 Spoil = Callable[[xr.Dataset], xr.Dataset]
@@ -110,9 +110,9 @@ def test_a_report_of_the_fallen_concludes_nothing(report: Report) -> None:
     texts = report({"": fall}, scenarios=ALONE)
     check(
         texts,
-        "Nothing is concluded: no robot stayed up under practice and under PD. All 6 robots fell.",
+        "Nothing is concluded: no robot stayed up under learning and under PD. All 6 robots fell.",
         "Nothing stands beside the paper's Table I: no robot stayed up.",
-        "Nothing to show: no robot stayed up that practice taught something.",
+        "Nothing to show: no robot stayed up that learning taught something.",
         "No robot stayed up: there is no mean error, and no interval, in this result.",
     )
     assert "tracking.svg" not in texts["md"]
@@ -122,7 +122,7 @@ def test_a_report_of_the_fallen_concludes_nothing(report: Report) -> None:
     ("who", "words"),
     [
         ("pd", "Nothing is concluded: no robot stayed up under PD. 2 robots fell."),
-        ("ilc", "Nothing is concluded: no robot stayed up under practice. 2 robots fell."),
+        ("ilc", "Nothing is concluded: no robot stayed up under learning. 2 robots fell."),
         ("model", "nothing is concluded: no robot stayed up under the model's feedforward."),
     ],
 )
@@ -135,14 +135,14 @@ def test_a_report_names_who_fell(report: Report, who: str, words: str) -> None:
 
 def test_a_report_of_a_practice_that_nothing_taught_counts_the_reasons(report: Report) -> None:
     texts = report({"ilc": teach_nothing}, scenarios=ALONE)
-    check(texts, "Nothing is concluded: practice learned from none of its", "contact lost). No")
+    check(texts, "Nothing is concluded: learning learned from none of its", "contact lost). No")
     assert "cuts the mean peak" not in texts["md"]
     assert "torques.svg" not in texts["md"]
 
 
 def test_a_report_of_strides_without_errors_concludes_nothing(report: Report) -> None:
     texts = report({"ilc": lose_errors}, scenarios=ALONE)
-    check(texts, "no robot has an error to compare under both practice and PD")
+    check(texts, "no robot has an error to compare under both learning and PD")
 
 
 def test_a_robot_that_finishes_no_stride_is_named(report: Report) -> None:
@@ -158,7 +158,7 @@ def test_a_world_of_the_fallen_is_one_world_less_and_no_more(report: Report) -> 
     check(
         texts,
         "In the calf it is better in 1 of 1.",
-        "In payload nothing is concluded: no robot stayed up under practice and under the model",
+        "In payload nothing is concluded: no robot stayed up under learning and under the model",
         "Robots fell: 2 of 2 in payload under ilc",
     )
     assert "heat-map.svg" in texts["md"]
@@ -167,8 +167,8 @@ def test_a_world_of_the_fallen_is_one_world_less_and_no_more(report: Report) -> 
 def test_a_suite_of_the_fallen_concludes_nothing(report: Report) -> None:
     check(
         report({"": fall}),
-        "In nominal nothing is concluded: no robot stayed up under practice",
-        "In payload nothing is concluded: no robot stayed up under practice",
+        "In nominal nothing is concluded: no robot stayed up under learning",
+        "In payload nothing is concluded: no robot stayed up under learning",
     )
 
 
@@ -193,12 +193,12 @@ def test_replays_show_the_fallen_and_leave_out_what_there_is_not(
 
     def made(befall: Spoil) -> str:
         results = spoiled(befall)
-        page = write_replay(practice_programme(results), results.folder / "replay.html")
+        page = write_replay(result_menu(results), results.folder / "replay.html")
         return page.read_text()
 
     assert '"before learning"' in made(fall)
-    assert practice_programme(spoiled(fall)).scene().caption.endswith("; the robot fell")
-    assert "fell" not in practice_programme(sound).scene().caption
+    assert result_menu(spoiled(fall)).scene().caption.endswith("; the robot fell")
+    assert "fell" not in result_menu(sound).scene().caption
     always = made(set_to(learning=1.0))  # there is nothing before the learning
     assert '"before learning"' not in always
     assert '"speed [m/s]": ["0.3"]' in made(finish_nothing)

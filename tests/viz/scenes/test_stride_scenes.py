@@ -11,7 +11,7 @@ from pronk_pin.compare import Experiment, Results, run_experiment
 from pronk_pin.compare.simulation.schedule import Schedule
 from pronk_pin.errors import InvalidInput
 from pronk_pin.viz.report import scenario_figures
-from pronk_pin.viz.scenes.stride_scenes import practice_programme
+from pronk_pin.viz.scenes.stride_scenes import result_menu
 
 
 @pytest.fixture(scope="module")
@@ -20,14 +20,14 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
     experiment = Experiment(
         speeds=(0.0, 0.5),
         controllers=("pd", "ilc", "model"),
-        schedule=Schedule(practice=5.0, learning=6.0),
+        schedule=Schedule(baseline=5.0, learning=6.0),
     )
     folder: Path = tmp_path_factory.mktemp("results") / "short"
     return run_experiment(experiment, folder, workers=1, progress=False)
 
 
 def test_the_first_scene_begins_three_strides_before_learning(results: Results) -> None:
-    scene = practice_programme(results).scene()
+    scene = result_menu(results).scene()
     strides = results.strides(results.find(controller="ilc")).sel(speed=0.5)
     first = int(np.flatnonzero(strides["learning"].to_numpy() == 1)[0])
     measured, planned = scene.tracks
@@ -38,9 +38,9 @@ def test_the_first_scene_begins_three_strides_before_learning(results: Results) 
 
 
 def test_the_robot_is_shown_as_it_was_measured(results: Results) -> None:
-    programme = practice_programme(results, speed=0.0, controller="pd")
+    menu = result_menu(results, speed=0.0, controller="pd")
     (measured, planned), strides = (
-        programme.scene().tracks,
+        menu.scene().tracks,
         results.strides(results.find(controller="pd")),
     )
     mine = strides.sel(speed=0.0)
@@ -56,8 +56,8 @@ def test_the_robot_is_shown_as_it_was_measured(results: Results) -> None:
 
 
 def test_the_last_strides_have_forces_that_carry_the_robot(results: Results) -> None:
-    programme = practice_programme(results)
-    scene = programme.scene({**programme.first, "strides": "the last ones"})
+    menu = result_menu(results)
+    scene = menu.scene({**menu.first, "strides": "the last ones"})
     track = scene.tracks[0]
     assert track.forces is not None
     times = np.arange(track.t[0], track.marks[-2].t, 0.001)
@@ -76,11 +76,11 @@ def test_a_trunk_that_pitches_is_shown_pitching(tmp_path: Path) -> None:
         speeds=(0.5,),
         controllers=("pd",),
         base="sagittal",
-        schedule=Schedule(practice=3.0, learning=0.5),
+        schedule=Schedule(baseline=3.0, learning=0.5),
     )
     results = run_experiment(experiment, tmp_path / "pitching", workers=1, progress=False)
     strides = results.strides(results.find(controller="pd")).isel(speed=0)
-    shown = practice_programme(results).scene().tracks[0]
+    shown = result_menu(results).scene().tracks[0]
     first = shown.marks[0].stride
     stance = strides.isel(stride=first).sel(part="stance", phase=0.5)
     t = 0.5 * float(strides["planned_duration"].sel(part="stance"))
@@ -92,7 +92,7 @@ def test_a_trunk_that_pitches_is_shown_pitching(tmp_path: Path) -> None:
 
 
 def test_strides_before_learning_run_beside_those_with_it(results: Results) -> None:
-    scene = practice_programme(results, beside="before learning").scene()
+    scene = result_menu(results, beside="before learning").scene()
     first, _, second, _ = scene.tracks
     assert second.name == "before learning"
     assert second.q[0, 1] - first.q[0, 1] == pytest.approx(0.55)
@@ -104,8 +104,8 @@ def test_strides_before_learning_run_beside_those_with_it(results: Results) -> N
 
 
 def test_any_stride_and_any_pair_can_be_chosen(results: Results) -> None:
-    programme = practice_programme(results, stride=20, beside="model", controller="pd")
-    tracks = programme.scene().tracks
+    menu = result_menu(results, stride=20, beside="model", controller="pd")
+    tracks = menu.scene().tracks
     assert [mark.stride for mark in tracks[0].marks[::2]] == [*range(12, 24)]
     assert tracks[2].name == "PD + model, beside"
 
@@ -123,13 +123,13 @@ def test_what_is_not_there_is_named(
     results: Results, asked: dict[str, object], message: str
 ) -> None:
     with pytest.raises(InvalidInput, match=message):
-        practice_programme(results, **asked)  # type: ignore[arg-type]
+        result_menu(results, **asked)  # type: ignore[arg-type]
 
 
 def test_before_learning_needs_learning(results: Results) -> None:
-    programme = practice_programme(results, controller="pd")
+    menu = result_menu(results, controller="pd")
     with pytest.raises(InvalidInput, match="no strides before learning"):
-        programme.scene({**programme.first, "beside it": "before learning"})
+        menu.scene({**menu.first, "beside it": "before learning"})
 
 
 def test_every_figure_has_its_axes_named_with_units(results: Results) -> None:
