@@ -164,6 +164,22 @@ class Robot:
         }
         return np.array([kinds.get(name, -1) for name in self.joint_names], dtype=np.intp)
 
+    @cached_property
+    def joint_coordinates(self) -> dict[str, tuple[str, list[str]]]:
+        """Coordinates of a dataset's axis `joint`: its name, its leg, and its kind in `JOINTS`."""
+        places = {
+            name: (leg, JOINTS[kind])
+            for leg in self.legs
+            for kind, name in enumerate(self.spec.leg_joints(leg))
+        }
+        legs, kinds = zip(*(places.get(name, ("", "")) for name in self.joint_names), strict=True)
+        names = [name.removesuffix("_joint") for name in self.joint_names]
+        return {
+            "joint": ("joint", names),
+            "leg": ("joint", list(legs)),
+            "kind": ("joint", list(kinds)),
+        }
+
     def of_joint(self, name: str) -> Array:
         """A parameter out of `armature`, `damping` and `coulomb`, by joint, shape (12,)."""
         return self.parameters.of_joint(name, self.joint_kinds, len(self.spec.joints))

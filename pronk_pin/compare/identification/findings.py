@@ -70,7 +70,7 @@ def format_shares(explanation: Explanation) -> str:
     shares = explanation.shares
     size = discrepancy(shares) ** 2
     heads = [(part, joint) for part in ("stance", "flight") for joint in JOINTS]
-    kinds = [str(name).split("_")[1] for name in shares["joint"].to_numpy()]
+    kinds = shares["kind"].to_numpy()
     lines = [
         f"{'learned - model':<18}" + "".join(f"{part:>9}" for part, _ in heads),
         f"{'explained by':<18}" + "".join(f"{joint:>9}" for _, joint in heads),
@@ -153,7 +153,7 @@ def _place(group: str) -> str:
 
 def _of_internal_forces(explanation: Explanation) -> Iterator[str]:
     torque = explanation.shares["torque"].sel(cause="internal forces", part="stance")
-    kinds = [str(name).split("_")[1] for name in torque["joint"].to_numpy()]
+    kinds = torque["kind"].to_numpy()
     for joint in dict.fromkeys(kinds):
         torque_of_kind = torque.isel(joint=[kind == joint for kind in kinds])
         size = float(np.sqrt((torque_of_kind**2).mean()))

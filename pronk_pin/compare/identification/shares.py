@@ -79,7 +79,6 @@ def shares(
             )
             torque[(slice(None), *at)] = causes_on_grid
     dims = ("speed", "part", "phase", "joint")
-    names = [name.removesuffix("_joint") for name in robot.joint_names]
     return xr.Dataset(
         {
             "learned": (dims, learned, {"units": "N m", "long_name": "torque told in the end"}),
@@ -93,7 +92,7 @@ def shares(
             "speed": ("speed", [gait.speed for gait in gaits], {"units": "m/s"}),
             "part": list(PARTS),
             "phase": phase_grid(SAMPLES),
-            "joint": names,
+            **robot.joint_coordinates,
             "duration": (
                 ("speed", "part"),
                 [[gait.phase(part).duration for part in PARTS] for gait in gaits],
@@ -199,6 +198,6 @@ def _settled(shares: xr.Dataset, values: xr.DataArray) -> xr.DataArray:
 
 def _by_kind(values: xr.DataArray) -> xr.DataArray:
     """Sum over the legs: the axis `joint` of twelve becomes one of hip, thigh, calf."""
-    kind = [str(name).split("_")[1] for name in values["joint"].to_numpy()]
-    summed = values.assign_coords(joint=kind).groupby("joint").sum()
-    return summed.sel(joint=list(dict.fromkeys(kind)))
+    kinds = values["kind"].to_numpy()
+    summed = values.drop_vars(["leg", "kind"]).assign_coords(joint=kinds).groupby("joint").sum()
+    return summed.sel(joint=list(dict.fromkeys(kinds)))

@@ -58,7 +58,8 @@ def _switched(strides: xr.Dataset) -> BoolArray:
 
 def by_joint(values: xr.DataArray) -> xr.DataArray:
     """Mean over the four legs: the axis `joint` of twelve becomes one of hip, thigh, calf."""
-    kinds = np.array([str(name).split("_")[1] for name in values["joint"].to_numpy()])
+    kinds = values["kind"].to_numpy()
+    values = values.drop_vars(["leg", "kind"], errors="ignore")
     means = [values.isel(joint=np.flatnonzero(kinds == kind)).mean("joint") for kind in JOINTS]
     joined = xr.concat(means, dim="joint", coords="minimal", compat="override")
     return joined.assign_coords(joint=list(JOINTS)).transpose(*values.dims)

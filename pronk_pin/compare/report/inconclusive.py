@@ -54,7 +54,7 @@ def _unpaired(table: pd.DataFrame, against: str) -> str:
     other = _NAMES[against]
     down = [name for name in (LEARNER, against) if not table.loc[name, "upright"]]
     if down:
-        names = " and under ".join({LEARNER: "practice", against: other}[name] for name in down)
+        names = " and under ".join({LEARNER: "learning", against: other}[name] for name in down)
         return f"no robot stayed up under {names}"
     compared = "reduction" if against == "pd" else "difference"
     values = [float(table.loc[LEARNER, f"{joint}_{compared}"]) for joint in SHOWN]

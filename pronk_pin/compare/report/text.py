@@ -106,7 +106,7 @@ def _against_the_model_by_scenario(
         yield (
             f"The {joint}'s mean peak is {1e3 * learning[joint]:.1f} against "
             f"{1e3 * model[joint]:.1f} mrad, by paired differences {change:+.1f} mrad ({low:+.1f} "
-            f"to {high:+.1f}); it is less in {ahead} of {_count(len(both), 'world')}, and the "
+            f"to {high:+.1f}); it is less in {ahead} of {_count(len(both), 'scenario')}, and the "
             f"probability that a robot improves is {_percent(learning, f'{joint}_wins')}."
         )
     if learning["beat"] > 0:
@@ -189,36 +189,36 @@ def suite_verdict(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -
     return _joined(*sentences, _where_robots_fell(table), _control_arm(summary))
 
 
-def _where_it_beats_the_model(practice: pd.DataFrame) -> Iterator[str]:
+def _where_it_beats_the_model(learning: pd.DataFrame) -> Iterator[str]:
     """What learning does in those worlds that tell, one a row."""
     for joint in SHOWN:
         better, worse, open_ = (
-            list(practice.index[practice[f"{joint}_model"] == sign]) for sign in (1, -1, 0)
+            list(learning.index[learning[f"{joint}_model"] == sign]) for sign in (1, -1, 0)
         )
-        parts = [f"In the {joint} it is better in {len(better)} of {len(practice)}"]
+        parts = [f"In the {joint} it is better in {len(better)} of {len(learning)}"]
         parts += [f"worse in {', '.join(worse)}"] if worse else []
         parts += [f"open in {', '.join(open_)}"] if open_ else []
         yield "; ".join(parts) + "."
-    beat, learners = practice["beat"].sum(), practice["learners"].sum()
-    median = practice["beat_strides"].median()
+    beat, learners = learning["beat"].sum(), learning["learners"].sum()
+    median = learning["beat_strides"].median()
     yield (
         f"{beat:.0f} of {learners:.0f} robots come to beat it in both joints and stay there"
         + (f", the scenarios' median is {median:.0f} strides." if beat else ".")
     )
 
 
-def _range_against_pd(practice: pd.DataFrame) -> Iterator[str]:
-    """The least and the greatest reduction against PD, and in which worlds."""
+def _range_against_pd(learning: pd.DataFrame) -> Iterator[str]:
+    """The least and the greatest reduction against PD, and in which scenarios."""
     for joint in SHOWN:
-        reduced = practice[f"{joint}_reduction"].dropna()
+        reduced = learning[f"{joint}_reduction"].dropna()
         if reduced.empty:
             continue
         best, least = reduced.idxmax(), reduced.idxmin()
         yield (
             f"Against PD the {joint}'s mean peak is less by "
-            f"{_percent(practice.loc[least], f'{joint}_reduction')} in {least}"
+            f"{_percent(learning.loc[least], f'{joint}_reduction')} in {least}"
             + (
-                f" to {_percent(practice.loc[best], f'{joint}_reduction')} in {best}."
+                f" to {_percent(learning.loc[best], f'{joint}_reduction')} in {best}."
                 if len(reduced) > 1
                 else "."
             )

@@ -88,7 +88,7 @@ def to_dataset(
             "stride": np.arange(last),
             "part": list(PARTS),
             "phase": ("phase", grid, {"units": "1"}),
-            "joint": [name.removesuffix("_joint") for name in robot.joint_names],
+            **robot.joint_coordinates,
             "axis": ["x", "z"],
             "rotation": ["roll", "pitch", "heading"],
             "foot": list(robot.legs),

@@ -127,11 +127,11 @@ def describe_transfers(table: pd.DataFrame) -> str:
     for row in table.itertuples():
         advice = "reuse" if row.reuse else "learn again"
         answer = "right" if row.right else "wrong"
-        if np.isnan(row.calf_practised):
+        if np.isnan(row.calf_relearned):
             answer = "open, as no robot stayed up that learned there"
         peaks = [
             f"{number(peak, '.4f'):>7}"
-            for peak in (row.thigh, row.calf, row.thigh_practised, row.calf_practised)
+            for peak in (row.thigh, row.calf, row.thigh_relearned, row.calf_relearned)
         ]
         lines.append(
             f"{row.task:<18}  {' '.join(peaks[:2])}       {' '.join(peaks[2:])}   "

@@ -21,9 +21,11 @@ from pronk_pin.compare.metrics import (
     strides_to_converge,
 )
 from pronk_pin.control import PARTS
+from pronk_pin.robot import load_robot
 
 BASELINE = 40
-NAMES = [f"{leg}_{joint}" for leg in ("FL", "FR", "RL", "RR") for joint in ("hip", "thigh", "calf")]
+JOINTS = load_robot("a1").joint_coordinates
+NAMES = JOINTS["joint"][1]
 
 
 @pytest.fixture
@@ -51,7 +53,7 @@ def made() -> Callable[..., xr.Dataset]:
                 "feedback": (curve, np.concatenate([3.0 * torque, 9.0 * torque], axis=2)),
                 "feedforward": (curve, np.concatenate([torque, torque], axis=2)),
             },
-            coords={"speed": [0.3], "stride": np.arange(n), "part": list(PARTS), "joint": NAMES},
+            coords={"speed": [0.3], "stride": np.arange(n), "part": list(PARTS), **JOINTS},
             attrs={
                 "robot": "a1",
                 "base": "locked",
@@ -150,7 +152,7 @@ def test_a_short_simulation_is_steady_as_a_whole(made: Callable[..., xr.Dataset]
 
 
 def test_joints_of_a_kind_are_averaged_over_the_legs() -> None:
-    values = xr.DataArray(np.arange(12.0), dims="joint", coords={"joint": NAMES})
+    values = xr.DataArray(np.arange(12.0), dims="joint", coords=JOINTS)
     mean = by_joint(values)
     assert mean["joint"].to_numpy().tolist() == ["hip", "thigh", "calf"]
     np.testing.assert_allclose(mean, [4.5, 5.5, 6.5])

@@ -100,7 +100,7 @@ def test_the_count_of_those_who_beat_it_leaves_nobody_out() -> None:
 
 
 def test_strides_are_read_as_they_are_stored() -> None:
-    names = ["FL_hip", "FL_thigh", "FL_calf"]
+    kinds = ["hip", "thigh", "calf"]
     peaks = np.add.outer(np.arange(6.0), [0.0, 10.0, 20.0])
     strides = xr.Dataset(
         {
@@ -109,7 +109,7 @@ def test_strides_are_read_as_they_are_stored() -> None:
             "learning": (("speed", "stride"), [[0.0, 0.0, 1.0, 1.0, 1.0, np.nan]]),
             "upright": (("speed", "stride"), [[1.0] * 5 + [np.nan]]),
         },
-        coords={"speed": [0.3], "stride": np.arange(6), "joint": names},
+        coords={"speed": [0.3], "stride": np.arange(6), "kind": ("joint", kinds)},
         attrs={
             "robot": "a1",
             "base": "locked",

@@ -16,6 +16,7 @@ from pronk_pin.compare.studies.reproduce import (
     readings,
     row_by_row,
 )
+from pronk_pin.robot import load_robot
 
 
 def test_every_reading_is_ordered_as_its_name_says(comparison: Results) -> None:
@@ -37,13 +38,13 @@ def test_readings_of_one_stride_known_by_hand() -> None:
     error = np.zeros((1, 1, 41, 12))
     error[0, 0, 2] = 0.09  # in the transient: 0.05 of 0.2 s
     error[0, 0, 20] = -0.04  # in the middle
-    names = [f"{leg}_{j}" for leg in ("FL", "FR", "RL", "RR") for j in ("hip", "thigh", "calf")]
+    joints = load_robot("a1").joint_coordinates
     end = xr.Dataset(
         {
             "error": (("speed", "stride", "phase", "joint"), error),
             "planned_duration": (("speed", "part"), [[0.2, 0.2]]),
         },
-        coords={"phase": phase, "joint": names, "part": ["stance", "flight"], "speed": [0.3]},
+        coords={"phase": phase, **joints, "part": ["stance", "flight"], "speed": [0.3]},
     )
     late = READINGS["peak after the first 50 ms"](end).sel(joint="calf")
     np.testing.assert_allclose(late, 0.04)
