@@ -491,7 +491,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "world of a number": (
         lambda: experiment(mjcf=3),
-        "world=3 is no path; give a text or a pathl",
+        "mjcf=3 is no path; give a text or a pathl",
     ),
     "too many seeds": (lambda: experiment(seeds=range(10_001)), "10001 seeds; give 10000 or fewer"),
     "run of a name": (lambda: run_experiment("default", "x"), "experiment='default' is a str; giv"),
@@ -648,7 +648,7 @@ SHORT = ["compare", "--speeds", "0.3", "--controllers", "pd"]
 
 COMMANDS: list[tuple[list[str], str]] = [
     (["compare", "--schedule.learning", "1e9"], "learning=1000000000.0; give a number from 0 to"),
-    (["compare", "--schedule.baseline", "nan"], "schedule: learning=nan; give a number from 0 to"),
+    (["compare", "--schedule.baseline", "nan"], "schedule: baseline=nan; give a number from 0 to"),
     (["compare", "--schedule.startup", "inf"], "schedule: startup=inf; give a number from 0 to"),
     (["compare", "--schedule.scatter", "5"], "scatter=5.0; give a number from 0 to 0.5 rad"),
     (["compare", "--schedule.baseline", "many"], "Error parsing --schedule.baseline"),

@@ -244,7 +244,7 @@ def _constraint_axes(constraint: Sequence[str] | None) -> list[int]:
         CONSTRAINT_COORDINATES.index(
             known_name("constraint coordinate", name, CONSTRAINT_COORDINATES)
         )
-        for name in (() if constraint is None else sequence_of("guide", constraint, text))
+        for name in (() if constraint is None else sequence_of("constraint", constraint, text))
     ]
     if len(set(axes)) != len(axes):
         raise InvalidInput(f"constraint={constraint} names a coordinate twice; name each once")
