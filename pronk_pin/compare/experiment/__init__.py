@@ -6,7 +6,14 @@ Goes out: `Results` on disk, with where they are from.
 
 from .demand import check_demand
 from .executors import known_address
-from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell, torque_library
+from .experiment import (
+    DEFAULT_CONTROLLERS,
+    Cell,
+    Experiment,
+    initial_feedforward,
+    run_cell,
+    torque_library,
+)
 from .results import Results, default_folder
 from .run import run_experiment
 from .suites import SUITES, load_suite
@@ -19,6 +26,7 @@ __all__ = [
     "Results",
     "check_demand",
     "default_folder",
+    "initial_feedforward",
     "known_address",
     "load_suite",
     "run_cell",

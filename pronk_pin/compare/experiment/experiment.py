@@ -30,7 +30,7 @@ from ...gait import SPEEDS, Gait, GaitLibrary, load_library
 from ...robot import BASES, ROBOTS, Robot, load_robot
 from ..identification import explain, identified_gaits
 from ..metrics import steady
-from ..simulation import Progress, Schedule, Simulation, to_dataset
+from ..simulation import Progress, Schedule, simulate
 from ..world import load_scenario
 from .definition import cell_definition, define, fingerprint, to_text
 
@@ -242,7 +242,7 @@ def run_cell(
 
     Args:
         cell: Its description.
-        learned: The strides of `cell.learned_strides`, where there is such a cell.
+        dependency: The strides of `cell.depends_on`, where there is such a cell.
         progress: Called with the number of time steps done since the last call.
 
     Returns:
@@ -252,26 +252,23 @@ def run_cell(
     robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.mjcf)
     library, spec = _gaits(cell.robot, cell.base), load_controller(cell.controller)
     gaits = [library.at(speed) for speed in cell.speeds]
-    identified = robot
+    model = robot
     if spec.source == "identified":
-        identified = explain(_learned(spec, dependency)).identified
-        gaits = identified_gaits(identified, gaits) if spec.identified_gaits else gaits
-    initial = _begin(spec, identified, gaits, dependency, cell.base)
-    # One stream a seed, the same for every controller: they start from the same postures.
-    rng = np.random.default_rng(np.random.SeedSequence(cell.seed))
-    simulation = Simulation(
+        model = explain(_learned(spec, dependency)).identified
+        gaits = identified_gaits(model, gaits) if spec.identified_gaits else gaits
+    return simulate(
         robot,
         gaits,
         spec,
         scenario,
         schedule=cell.schedule,
-        rng=rng,
-        feedforward=initial.feedforward,
-        flight=initial.flight,
+        # One stream a seed, the same for every controller: they start from the same postures.
+        rng=np.random.default_rng(np.random.SeedSequence(cell.seed)),
+        initial=initial_feedforward(spec, gaits, model=model, learned=dependency, base=cell.base),
         base=cell.base,
+        attributes=_attributes(cell),
+        progress=progress,
     )
-    log = simulation.run(progress)
-    return to_dataset(log, robot, gaits, attributes=_attributes(cell))
 
 
 def _gaits(robot: str, base: str) -> GaitLibrary:
@@ -290,20 +287,31 @@ def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     )
 
 
-def _begin(
+def initial_feedforward(
     spec: ControllerSpec,
-    robot: Robot,
     gaits: Sequence[Gait],
-    dependency: xr.Dataset | None,
-    base: str,
+    *,
+    model: Robot,
+    learned: xr.Dataset | None = None,
+    base: str = "locked",
 ) -> InitialFeedforward:
-    """What a controller begins with."""
+    """Torques that a controller begins with, by the source that its specification names.
+
+    Args:
+        spec: The controller.
+        gaits: The gaits to be played, one for each robot.
+        model: The robot as the model knows it: the identified one where that is the source.
+        learned: Strides of the learning that a torque library is made of.
+        base: How the trunk may move.
+
+    Raises:
+        InvalidInput: The torques are to be learned ones, and there are no strides.
+    """
     if spec.source in ("model", "identified"):
-        return InitialFeedforward(model_feedforward(robot, gaits, base=base))
+        return InitialFeedforward(model_feedforward(model, gaits, base=base))
     if spec.source == "library":
-        learned = torque_library(_learned(spec, dependency))
-        speeds = np.array([gait.speed for gait in gaits])
-        return learned.initial_feedforward(speeds)
+        library = torque_library(_learned(spec, learned))
+        return library.initial_feedforward(np.array([gait.speed for gait in gaits]))
     return InitialFeedforward()
 
 

@@ -28,6 +28,7 @@ import warnings
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -397,9 +398,14 @@ class Results:
     def summary(self) -> pd.DataFrame:
         """Read summary.csv; where it is missing, damaged or incomplete it is made again.
 
+        It is read once for each state of the folder, as the manifest tells it.
+
         Raises:
             FileProblem: The strides that it is made of are missing or damaged.
         """
+        return _summary(self, self.strides_digest, self._manifest.digest([_SUMMARY])).copy()
+
+    def _read_summary(self) -> pd.DataFrame:
         path = self.folder / _SUMMARY
         try:
             self._manifest.read(_SUMMARY, "")
@@ -434,6 +440,12 @@ class Results:
     def strides_digest(self) -> str:
         """SHA-256 of all strides there are, as the manifest has them."""
         return self._manifest.digest([_strides_name(cell) for cell in self.experiment.cells()])
+
+
+@lru_cache(maxsize=4)
+def _summary(results: Results, strides: str, summary: str) -> pd.DataFrame:
+    """The summary of a result, as long as its files, by their digests, are the same."""
+    return results._read_summary()
 
 
 @dataclass(frozen=True)

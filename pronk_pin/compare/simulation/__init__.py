@@ -7,6 +7,7 @@ Goes out: a log of strides and ticks, and its labelled dataset.
 from .dataset import to_dataset
 from .memory import SHORTER, check_memory, number_of_robots
 from .schedule import Schedule
+from .simulate import simulate
 from .simulation import Progress, Simulation
 
 __all__ = [
@@ -16,5 +17,6 @@ __all__ = [
     "Simulation",
     "check_memory",
     "number_of_robots",
+    "simulate",
     "to_dataset",
 ]

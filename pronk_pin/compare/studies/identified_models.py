@@ -16,13 +16,13 @@ import xarray as xr
 from tqdm import tqdm
 
 from ..._typing import Array
-from ...control import ControllerSpec, InitialFeedforward, load_controller, model_feedforward
+from ...control import load_controller
 from ...errors import InvalidInput
-from ...gait import Gait, load_library
-from ..experiment import torque_library
+from ...gait import load_library
+from ..experiment import initial_feedforward
 from ..identification import Explanation, identified_gaits
 from ..metrics import by_joint
-from ..simulation import Schedule, Simulation, to_dataset
+from ..simulation import Schedule, simulate
 from ..world import Scenario, load_scenario
 
 CONTROLLERS = ("model", "library", "ilc", "identified", "identified+gait")
@@ -90,15 +90,16 @@ def close_loop(
             for name in controllers:
                 spec = load_controller(name)
                 played = again if spec.identified_gaits else gaits
-                initial = _begin(spec, explanation, played, strides)
-                simulated = _simulate(
-                    explanation,
+                identified = spec.source == "identified"
+                model = explanation.identified if identified else explanation.robot
+                simulated = simulate(
+                    explanation.robot,
                     played,
                     spec,
                     scenario,
-                    schedule,
-                    np.random.default_rng(seed),
-                    initial,
+                    schedule=schedule if any(spec.laws) else replace(schedule, learning=0.0),
+                    rng=np.random.default_rng(seed),
+                    initial=initial_feedforward(spec, played, model=model, learned=strides),
                 )
                 rows += _rows(scenario.name, name, simulated)
                 bar.update()
@@ -143,41 +144,6 @@ def _scenarios(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) 
             "these strides do not tell the world they were made in; give the scenarios"
         ) from error
     return [own, replace(own, name=f"{own.name}+3kg", payload=own.payload + 3.0)]
-
-
-def _begin(
-    spec: ControllerSpec, explanation: Explanation, gaits: Sequence[Gait], strides: xr.Dataset
-) -> InitialFeedforward:
-    """Initial feedforward of a controller."""
-    if spec.source == "library":
-        return torque_library(strides).initial_feedforward(np.array([gait.speed for gait in gaits]))
-    if spec.source == "none":
-        return InitialFeedforward()
-    robot = explanation.identified if spec.source == "identified" else explanation.robot
-    return InitialFeedforward(model_feedforward(robot, gaits))
-
-
-def _simulate(
-    explanation: Explanation,
-    gaits: Sequence[Gait],
-    spec: ControllerSpec,
-    scenario: Scenario,
-    schedule: Schedule,
-    rng: np.random.Generator,
-    initial: InitialFeedforward,
-) -> xr.Dataset:
-    learns = any(law is not None for law in spec.laws)
-    simulation = Simulation(
-        explanation.robot,
-        gaits,
-        spec,
-        scenario,
-        schedule=schedule if learns else replace(schedule, learning=0.0),
-        rng=rng,
-        feedforward=initial.feedforward,
-        flight=initial.flight,
-    )
-    return to_dataset(simulation.run(), explanation.robot, gaits, attributes={})
 
 
 def _rows(scenario: str, controller: str, strides: xr.Dataset) -> list[dict[str, object]]:

@@ -29,7 +29,7 @@ from ...errors import InvalidInput
 from ...gait import load_library
 from ...robot import JOINTS, load_robot
 from ..experiment import Results
-from ..simulation import Schedule, Simulation, to_dataset
+from ..simulation import Schedule, simulate
 from ..world import Scenario
 
 _BASELINE = 6.0
@@ -87,7 +87,7 @@ def simulate_learning(
     library = load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     longest = max(gait.duration for gait in gaits)
-    simulation = Simulation(
+    return simulate(
         load_robot(robot),
         gaits,
         replace(spec, flight_law=None, timing=None),
@@ -95,7 +95,6 @@ def simulate_learning(
         schedule=Schedule(baseline=_BASELINE, learning=1.25 * (strides + 2) * longest),
         rng=np.random.default_rng(0),
     )
-    return to_dataset(simulation.run(), load_robot(robot), gaits, attributes={"robot": robot})
 
 
 def stored_learning(
