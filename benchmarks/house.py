@@ -1,7 +1,7 @@
 """Sizes of the package: `python benchmarks/house.py`.
 
-Prints the fullest room, the longest file, the longest function and the lines of all, docstrings,
-comments and empty lines included.
+Prints the fullest rooms (files, faces aside), the longest file, the longest function and the lines
+of the whole package, docstrings, comments and empty lines included.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-PACKAGE = Path(__file__).parents[1] / "pronk_pin"
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "pronk_pin"
 
 
 def functions(path: Path) -> Iterator[tuple[int, str]]:
@@ -19,7 +20,7 @@ def functions(path: Path) -> Iterator[tuple[int, str]]:
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first = min([node.lineno, *(each.lineno for each in node.decorator_list)])
-            place = f"{path.relative_to(PACKAGE.parent)}:{node.lineno} {node.name}"
+            place = f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
             yield (node.end_lineno or first) - first + 1, place
 
 
@@ -28,11 +29,12 @@ def main() -> None:
     files = sorted(PACKAGE.rglob("*.py"))
     rooms = Counter(path.parent for path in files if path.name != "__init__.py")
     lengths = {path: len(path.read_text().splitlines()) for path in files}
-    room, most = rooms.most_common(1)[0]
+    most = max(rooms.values())
+    full = ", ".join(str(room.relative_to(ROOT)) for room in sorted(rooms) if rooms[room] == most)
     longest = max(lengths, key=lengths.__getitem__)
     lines, place = max(each for path in files for each in functions(path))
-    print(f"fullest room      {most:5d} files  {room.relative_to(PACKAGE.parent)}")
-    print(f"longest file      {lengths[longest]:5d} lines  {longest.relative_to(PACKAGE.parent)}")
+    print(f"fullest rooms     {most:5d} files  {full}")
+    print(f"longest file      {lengths[longest]:5d} lines  {longest.relative_to(ROOT)}")
     print(f"longest function  {lines:5d} lines  {place}")
     print(f"the package       {sum(lengths.values()):5d} lines  in {len(files)} files")
 
