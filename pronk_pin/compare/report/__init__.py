@@ -7,7 +7,7 @@ Goes out: tables and text for a terminal and for the report.
 from .difference import format_changes
 from .limitations import limitations
 from .tables import SHOWN, SHOWN_PARAMETERS, answer, beside_the_paper, sampled_scenarios
-from .text import (
+from .verdict import (
     against_model,
     answer_in_words,
     beat_text,

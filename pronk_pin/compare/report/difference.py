@@ -12,7 +12,7 @@ from ...errors import InvalidInput
 from ..experiment import Results
 from ..metrics import compare_pairs, family, robots
 from .tables import SHOWN
-from .text import between, number
+from .verdict import between, number
 
 LEVEL = 0.05
 """Share of false alarms among the changes that are named."""

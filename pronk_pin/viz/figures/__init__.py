@@ -5,20 +5,19 @@ Goes out: figures, or files of them.
 """
 
 from .explanation_figure import write_explanation_figure
-from .figures import (
+from .gait_figures import write_gait_figures
+from .learning_figures import errors_by_seed, learning_curves, predicted_and_measured
+from .skill_figures import gains_figure, transfers_figure
+from .suite_figures import by_scenario, heat_map, peak_curves
+from .tracking_figures import (
     LABELS,
     errors_by_speed,
     learned_minus_model,
-    learning_curves,
-    stayed_up,
     torque_library,
     torque_surface,
     tracking,
+    upright_strides,
 )
-from .gait_figures import write_gait_figures
-from .learning_figures import errors_by_seed, predicted_and_measured
-from .skill_figures import gains_figure, transfers_figure
-from .suite_figures import by_scenario, heat_map, peak_curves
 
 __all__ = [
     "LABELS",
@@ -31,11 +30,11 @@ __all__ = [
     "learning_curves",
     "peak_curves",
     "predicted_and_measured",
-    "stayed_up",
     "torque_library",
     "torque_surface",
     "tracking",
     "transfers_figure",
+    "upright_strides",
     "write_explanation_figure",
     "write_gait_figures",
 ]

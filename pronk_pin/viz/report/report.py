@@ -157,7 +157,7 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
         figures_by_name["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
         figures_by_name["torques"] = figures.torque_library(learned)
         figures_by_name["surface"] = figures.torque_surface(learned)
-        model = figures.stayed_up(strides["model"]) if "model" in strides else None
+        model = figures.upright_strides(strides["model"]) if "model" in strides else None
         if model is not None and set(model["speed"].values) & set(learned["speed"].values):
             figures_by_name["difference"] = figures.learned_minus_model(learned, model)
     return figures_by_name
@@ -166,7 +166,7 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
 def _learned(strides: xr.Dataset) -> xr.Dataset:
     """The strides of the robots that stayed up and learned something."""
     taught = (strides["learning"] == 1) & (strides["skipped"] == 0)
-    return figures.stayed_up(strides.isel(speed=np.flatnonzero(taught.any("stride"))))
+    return figures.upright_strides(strides.isel(speed=np.flatnonzero(taught.any("stride"))))
 
 
 def write_figures(results: Results, folder: Path) -> list[Path]:

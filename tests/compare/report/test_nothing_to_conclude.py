@@ -26,7 +26,7 @@ from pronk_pin.compare.report.tables import (
     sampled_scenarios,
     worst_reduction,
 )
-from pronk_pin.compare.report.text import format_suite, format_tables, suite_verdict, verdict
+from pronk_pin.compare.report.verdict import format_suite, format_tables, suite_verdict, verdict
 from pronk_pin.compare.studies.gain_reduction import describe_gains, mean_peaks
 from pronk_pin.compare.studies.reproduce import format_reproduction
 from pronk_pin.compare.studies.seeding import LEARNERS, describe_seeding
