@@ -1,4 +1,4 @@
-"""What every worker process of ours does first.
+"""Processes: what a worker does first, and how one is ended amid a solver's work.
 
 It imports the standard library only: a worker is to watch its parent before it imports the rest of
 this package, which takes seconds.
@@ -12,13 +12,13 @@ import shutil
 import signal
 import tempfile
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from multiprocessing import connection
 from multiprocessing.sharedctypes import Synchronized
+from types import FrameType
 
 _steps_done: Synchronized[int] | None = None
-
-
-_MOST = 1024
 
 
 def begin_worker(folder: str, counter: Synchronized[int] | None = None) -> None:
@@ -49,3 +49,30 @@ def count_steps(steps: int) -> None:
     if _steps_done is not None:
         with _steps_done.get_lock():
             _steps_done.value += steps
+
+
+@contextmanager
+def heeding_signals() -> Iterator[None]:
+    """Around a solver in C++ that takes an interruption for a failure of its own and goes on.
+
+    A signal ends the solver at once, and is sent again when that has returned, to whoever handles
+    it outside.
+    """
+    came: list[int] = []
+
+    def end(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if callable(signal.getsignal(number)):
+                before[number] = signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from pronk_pin import _workers
+from pronk_pin._workers import heeding_signals
 
 ROOT = Path(__file__).parents[1]
 COMPARE = ["compare", "--workers", "2", "--controllers", "pd", "ilc", "library"]
@@ -117,6 +118,19 @@ def test_a_build_of_gaits_that_is_asked_to_end_leaves_nothing(
     wait_for(lambda: list((tmp_path / "work").rglob("*.npz")), 60.0)
     time.sleep(0.5)  # amid the solver, for one process
     assert_ends_clean(process, tmp_path, signal.SIGTERM)
+
+
+def test_a_signal_that_a_solver_takes_for_a_failure_of_its_own_is_sent_again() -> None:
+    came: list[int] = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: came.append(number))
+    try:
+        with heeding_signals():
+            with contextlib.suppress(KeyboardInterrupt):  # as CasADi does
+                signal.raise_signal(signal.SIGTERM)
+            assert not came
+        assert came == [signal.SIGTERM]
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def test_a_film_that_is_asked_to_end_ends_its_browser_and_leaves_nothing(

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..._typing import Array
+from ..._workers import heeding_signals
 from .transcription import Constraint, Transcription
 
 DEMANDS: Mapping[str, tuple[float, str]] = {
@@ -105,14 +106,15 @@ def find_conflicts(program: Transcription, start: Array, p: Array) -> dict[str, 
             "g": ca.vertcat(*[ca.vec(c.expression) for c in constraints]),
         }
         solver = ca.nlpsol("elastic", "ipopt", problem, _OPTIONS | strategy)
-        result = solver(
-            x0=np.concatenate([start, np.ones(len(names))]),
-            lbx=np.concatenate([*lower, np.zeros(len(names))]),
-            ubx=np.concatenate([*upper, np.full(len(names), np.inf)]),
-            lbg=np.repeat([c.lower for c in constraints], sizes),
-            ubg=np.repeat([c.upper for c in constraints], sizes),
-            p=p,
-        )
+        with heeding_signals():
+            result = solver(
+                x0=np.concatenate([start, np.ones(len(names))]),
+                lbx=np.concatenate([*lower, np.zeros(len(names))]),
+                ubx=np.concatenate([*upper, np.full(len(names), np.inf)]),
+                lbg=np.repeat([c.lower for c in constraints], sizes),
+                ubg=np.repeat([c.upper for c in constraints], sizes),
+                p=p,
+            )
         if solver.stats()["success"]:
             slacks = np.array(result["x"]).ravel()[-len(names) :]
             conflicting = [i for i in np.argsort(-slacks) if slacks[i] > NOTABLE]

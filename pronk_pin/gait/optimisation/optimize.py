@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 
 from ..._checks import instance_of
 from ..._typing import Array
+from ..._workers import heeding_signals
 from ...errors import GaitNotFound, InvalidInput
 from ..checks import TOLERANCE
 from ..gait import Gait, GaitPhase, Motion
@@ -246,7 +247,8 @@ def _solve(
         start = {"x0": program.pack(guess)}
     solver = _solver(_structure(problem), warm=warm)
     clock = time.perf_counter()
-    result = solver(**start, **program.bounds, p=_parameters(problem))
+    with heeding_signals():
+        result = solver(**start, **program.bounds, p=_parameters(problem))
     solve_time = time.perf_counter() - clock
     state = SolverState(*(np.array(result[key]).ravel() for key in ("x", "lam_x", "lam_g")))
     stats = solver.stats()
