@@ -32,13 +32,6 @@ from pronk_pin.compare.experiment.strides_file import encode
 from pronk_pin.errors import FileProblem, InvalidInput
 
 
-@pytest.fixture
-def copy(comparison: Results, tmp_path: Path) -> Results:
-    """A copy of the comparison that a test may damage."""
-    folder = shutil.copytree(comparison.folder, tmp_path / "copy")
-    return Results(folder, comparison.experiment)
-
-
 def message(call: Callable[[], Any], path: Path) -> str:
     """What a call complains about a file, in one line."""
     with pytest.raises(FileProblem) as caught:

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import pickle
-import shutil
 from pathlib import Path
 
 import pytest
@@ -16,17 +15,7 @@ from pronk_pin.errors import (
     SpeedOutOfRange,
     UnknownName,
 )
-
-
-@pytest.fixture
-def copy(comparison: Results, tmp_path: Path) -> Results:
-    folder = shutil.copytree(comparison.folder, tmp_path / "copy")
-    return Results(folder, comparison.experiment)
-
-
-def modified(results: Results) -> dict[str, int]:
-    """When each file of strides was written."""
-    return {path.name: path.stat().st_mtime_ns for path in results.folder.glob("strides/*.nc")}
+from tests.compare.experiment.conftest import modified
 
 
 def test_a_run_leaves_strides_summary_and_config_and_nothing_else(comparison: Results) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -24,16 +23,7 @@ from pronk_pin.compare.experiment.definition import (
 from pronk_pin.compare.experiment.strides_file import encode
 from pronk_pin.control import CONTROLLERS, ControllerSpec, PDTypeILC
 from pronk_pin.errors import FileProblem, InvalidInput, OtherMachine
-
-
-@pytest.fixture
-def copy(comparison: Results, tmp_path: Path) -> Results:
-    folder = shutil.copytree(comparison.folder, tmp_path / "copy")
-    return Results(folder, comparison.experiment)
-
-
-def modified(results: Results) -> dict[str, int]:
-    return {path.name: path.stat().st_mtime_ns for path in results.folder.glob("strides/*.nc")}
+from tests.compare.experiment.conftest import modified
 
 
 def refused(call: Callable[[], object]) -> str:
