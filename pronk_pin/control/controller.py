@@ -17,8 +17,16 @@ from ..gait import Gait, known_gaits
 from ..kinematics import rotate_leg
 from ..robot import BASES, NL, Robot, as_array, as_numbers
 from .controller_spec import ControllerSpec
-from .feedback import Balance, SpeedEstimator
-from .learning import SKIPPED, ModelBasedILC, anti_windup, delivered, learned_by, symmetric
+from .feedback import SpeedEstimator
+from .learning import (
+    SKIPPED,
+    LawContext,
+    anti_windup,
+    bound,
+    delivered,
+    learned_by,
+    symmetric,
+)
 from .prediction import StrideSettings, lifted_model
 from .signals import (
     PARTS,
@@ -27,7 +35,6 @@ from .signals import (
     Reference,
     StrideRecord,
     Tape,
-    ZeroPhaseFilter,
     held,
     phase_grid,
     resample,
@@ -43,6 +50,22 @@ _LATE_TOUCHDOWN = 1.2
 
 TIMESTEP = Interval(1e-5, 0.01, "s")
 """Time steps of the control that make sense."""
+
+
+def _known_feedforward(feedforward: Array | None, n: int) -> Array:
+    """The feedforward to begin with [N m], shape (n, 2, samples, 12), copied; by default none."""
+    shape = (n, len(PARTS), SAMPLES, NL)
+    if feedforward is None:
+        return np.zeros(shape)
+    feedforward = as_numbers("feedforward", feedforward)
+    if feedforward.shape != shape:
+        raise InvalidInput(
+            f"a feedforward of shape {feedforward.shape}; expected {shape}: "
+            "torques on the phase grids of stance and flight for each gait"
+        )
+    if not np.isfinite(feedforward).all():
+        raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
+    return feedforward.copy()
 
 
 class Controller:
@@ -73,68 +96,48 @@ class Controller:
         gaits = known_gaits(robot, gaits)
         instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
         timestep = real("timestep", timestep, TIMESTEP)
-        n = len(gaits)
         known_name("base", base, BASES)
-        shape = (n, len(PARTS), SAMPLES, NL)
-        feedforward = (
-            np.zeros(shape) if feedforward is None else as_numbers("feedforward", feedforward)
-        )
-        if flight is not None:
-            flight = as_array("flight", flight, n, ())
-        if feedforward.shape != shape:
-            raise InvalidInput(
-                f"a feedforward of shape {feedforward.shape}; expected {shape}: "
-                "torques on the phase grids of stance and flight for each gait"
-            )
-        if not np.isfinite(feedforward).all():
-            raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
+        n = len(gaits)
         self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
-        self.feedforward = feedforward.copy()
-        self._timestep = timestep
+        self.feedforward = _known_feedforward(feedforward, n)
         self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
+        self._timestep, self._base = timestep, base
         self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
         self._tilt = np.zeros((n, len(PARTS)))
-        self._stance_verdict = np.zeros(
-            n, dtype=np.intp
-        )  # why a stance was none, index into `SKIPPED`
+        # Why a stance was none, index into `SKIPPED`.
+        self._stance_verdict = np.zeros(n, dtype=np.intp)
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
-        self._laws = list(spec.laws)
-        self._base = base
-        for law in self._laws:
-            learning_filter = getattr(law, "filter", None)
-            if isinstance(learning_filter, ZeroPhaseFilter):
-                learning_filter.warn()
-        if base != "locked" and isinstance(spec.law, ModelBasedILC):
-            raise InvalidInput(
-                f"controller '{spec.name}' has a law with a model that counts on a level trunk; "
-                "use another controller, or base 'locked'"
-            )
-        if isinstance(spec.law, ModelBasedILC):
-            settings = StrideSettings(
-                spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
-            )
-            self._laws[0] = spec.law.bind([lifted_model(robot, gait, settings) for gait in gaits])
         self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
         self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
-        self.balance = None
-        if base != "locked":
-            self.balance = Balance(
-                robot,
-                gaits,
-                spec.balance,
-                gains=spec.gains,
-                ticks=self.max_ticks,
-                timestep=timestep,
-            )
         self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
         if flight is not None:
-            self._flight.stretch(np.arange(n), flight)
+            self._flight.stretch(np.arange(n), as_array("flight", flight, n, ()))
+        context = self._context()
+        self._laws = [bound(law, context) for law in spec.laws]
+        self.balance = spec.balance.bind(context)
         self._always_retimes = flight is None and not any(self._laws)
         end = np.array([1.0])
         self._lift_off_speed = np.array(
             [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
+        )
+
+    def _context(self) -> LawContext:
+        """What laws and balance are bound to."""
+        spec, timestep = self.spec, self._timestep
+        settings = StrideSettings(
+            spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
+        )
+        return LawContext(
+            robot=self.robot,
+            gaits=self.gaits,
+            controller=spec.name,
+            gains=spec.gains,
+            base=self._base,
+            timestep=timestep,
+            ticks=self.max_ticks,
+            lifted_model=lambda gait: lifted_model(self.robot, gait, settings),
         )
 
     @property

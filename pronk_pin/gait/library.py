@@ -251,12 +251,12 @@ def from_arrays(arrays: StoredArrays) -> GaitLibrary:
     audits = arrays.as_type(arrays.document("audit"), list[StoredAudit])
     try:
         gaits = _gaits(arrays, metadata["robot"])
+        if len(audits) > len(gaits):
+            raise arrays.damaged(f"{len(audits)} audits for {len(gaits)} gaits")
         found = tuple(
             Audit.from_stored(gait.speed, stored)
-            for gait, stored in zip(gaits, audits, strict=False)  # their number is checked below
+            for gait, stored in zip(gaits[: len(audits)], audits, strict=True)
         )
-        if len(found) != len(audits):
-            raise arrays.damaged(f"{len(audits)} audits for {len(gaits)} gaits")
         return GaitLibrary(gaits, metadata, found, float(arrays.numbers("default_apex")))
     except InvalidInput as error:
         raise arrays.damaged(error) from error

@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Literal
 
 from .._checks import (
@@ -243,6 +244,6 @@ def _check_sequence(sequence: tuple[ContactPhase, ...]) -> None:
     for pair in PAIRS:
         if not any(pair in phase.stands for phase in sequence):
             raise InvalidInput(f"the {pair} legs never stand; add them to a phase")
-    for before, phase in zip((sequence[-1], *sequence), sequence, strict=False):
+    for before, phase in pairwise((sequence[-1], *sequence)):
         if before.stands == phase.stands:
             raise InvalidInput(f"{before.name} and {phase.name} have the same feet; merge them")

@@ -28,7 +28,7 @@ from ...gait import Gait, known_gaits
 from ...inverse_dynamics import distribute_wrench
 from ...kinematics import contact_points, leg_geometry
 from ...robot import JOINTS, Robot, rotation_matrix
-from ..signals import PARTS, Gains
+from ..signals import PARTS, ControlContext, Gains
 from .attitude import AttitudeRegulator, attitude_angle, attitude_error, pitched
 from .foot_placement import FootPlacement, placed
 
@@ -57,6 +57,19 @@ class BalanceSpec:
     def __post_init__(self) -> None:
         keep_instances(self, "balance: ", attitude=AttitudeRegulator, placement=FootPlacement)
         keep_reals(self, {"learned": SHARE, "landing": SHARE}, "balance: ")
+
+    def bind(self, context: ControlContext) -> Balance | None:
+        """The balance of a controller's robots; None where their trunks are locked."""
+        if context.base == "locked":
+            return None
+        return Balance(
+            context.robot,
+            context.gaits,
+            self,
+            gains=context.gains,
+            ticks=context.ticks,
+            timestep=context.timestep,
+        )
 
 
 _TICKS = Interval(1, 10_000_000)

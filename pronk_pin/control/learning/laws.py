@@ -5,24 +5,55 @@ A law is a function with parameters and no state: what was learned so far is in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
 from ..._checks import SHARE, Interval, instance_of, keep_reals, shown
 from ..._typing import Array, BoolArray, IntArray
 from ...errors import InvalidInput
-from ..signals import PAPER_A, PAPER_B, Gains, StrideRecord, ZeroPhaseFilter, look_ahead
+from ...gait import Gait
+from ..signals import (
+    PAPER_A,
+    PAPER_B,
+    ControlContext,
+    Gains,
+    StrideRecord,
+    ZeroPhaseFilter,
+    look_ahead,
+)
+from .lifted import LiftedModel
 
 
 class LearningLaw(Protocol):
-    """A learning law `u_{k+1} = L(record_k)`: from a stride's record to the next feedforward."""
+    """A learning law `u_{k+1} = L(record_k)`: from a stride's record to the next feedforward.
+
+    One that needs to know its robots has a method `bind(context)` too, from a `LawContext` to the
+    law that is to be used for them.
+    """
 
     def update(self, record: StrideRecord) -> Array:
         """Compute the next stride's feedforward on the phase grid [N m], shape (n, samples, 12)."""
         ...
+
+
+@dataclass(frozen=True)
+class LawContext(ControlContext):
+    """What a learning law may be bound to.
+
+    Attributes:
+        lifted_model: Linearises the strides of a gait under the controller; takes a second.
+    """
+
+    lifted_model: Callable[[Gait], LiftedModel]
+
+
+def bound(law: LearningLaw | None, context: LawContext) -> LearningLaw | None:
+    """A law bound to the robots that it learns for, if it has a method `bind`."""
+    bind = getattr(law, "bind", None)
+    return law if bind is None else known_law(f"{context.controller}: bound law", bind(context))
 
 
 SKIPPED = (
@@ -162,8 +193,24 @@ def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array
     return answer
 
 
+class FilteredLaw:
+    """A law with a learning filter, which is looked at when the law is bound.
+
+    Attributes:
+        filter: The learning filter Q.
+    """
+
+    filter: ZeroPhaseFilter
+
+    def bind(self, context: LawContext) -> Self:
+        """The law itself; warns with `LeakyFilter` if constant torques do not pass its filter."""
+        if isinstance(self.filter, ZeroPhaseFilter):  # it may be any function
+            self.filter.warn()
+        return self
+
+
 @dataclass(frozen=True)
-class PDTypeILC:
+class PDTypeILC(FilteredLaw):
     """PD-type ILC on a memory that holds the feedforward only, with forgetting.
 
     `ff <- Q[(1 - leak) ff + gain (Kp e + Kd e')(s + delta)]`
@@ -196,7 +243,7 @@ class PDTypeILC:
 
 
 @dataclass(frozen=True)
-class PaperILC:
+class PaperILC(FilteredLaw):
     """The paper's law: eq. (10), on the recorded total torque, with the printed filter.
 
     `ff <- Q[tau + (Kp e + Kd e')(s + delta)]` with `tau = ff + tau_b`, the recorded torque.
@@ -225,7 +272,7 @@ class PaperILC:
 
 
 @dataclass(frozen=True)
-class CurrentIterationILC:
+class CurrentIterationILC(FilteredLaw):
     """Current-iteration law: the feedback that acted in the stride becomes memory.
 
     `ff <- Q[(1 - leak) ff + gain tau_b(s + delta)]`
@@ -262,3 +309,14 @@ def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:
     error = look_ahead(record.error, delta, record.error_onward)
     rate = look_ahead(record.error_rate, delta, record.rate_onward)
     return gains.proportional * error + gains.derivative * rate
+
+
+FLIGHT_LAW = PDTypeILC(
+    gain=0.8,
+    leak=0.02,
+    delta=0.08,
+    # The error's rate would learn the vibration of the leg after lift-off.
+    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    filter=ZeroPhaseFilter.butterworth(3, 0.04),
+)
+"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
