@@ -151,7 +151,7 @@ def test_a_robot_below_the_height_of_its_gait_has_fallen(
     simulation: Callable[..., Simulation], gaits: list[Gait]
 ) -> None:
     watched = simulation(PD)
-    watched.player._floor = np.array([0.0, gaits[1].apex])
+    watched.player.falls.floor = np.array([0.0, gaits[1].apex])
     watched.run()
     assert watched.upright.tolist() == [True, False]
 
