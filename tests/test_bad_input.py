@@ -33,6 +33,7 @@ from pronk_pin.compare import (
     run_experiment,
 )
 from pronk_pin.compare.simulation import memory
+from pronk_pin.compare.simulation.quantities import STRIDE_QUANTITIES
 from pronk_pin.compare.studies.gain_reduction import sweep_gains
 from pronk_pin.compare.studies.prediction import simulate_learning
 from pronk_pin.compare.studies.seeding import measure_seeding
@@ -630,8 +631,7 @@ def test_what_does_not_fit_into_memory_is_refused_with_the_estimate_and_the_reme
     schedule = Schedule(baseline=100.0, learning=100.0)
     simulation = simulated(gaits=gaits, schedule=replace(schedule))
     log, estimate = simulation.strides, memory.log_size(gaits, schedule.duration)
-    arrays = [*log.scalars.values(), *log.curves.values(), log.base, log.attitude]
-    arrays += [log.peak_error, log.rms_error, log.contact_error]
+    arrays = [log[quantity.name] for quantity in STRIDE_QUANTITIES]
     assert estimate == pytest.approx(sum(array.nbytes for array in arrays), rel=0.02)
     monkeypatch.setattr(memory, "memory", lambda: 4.0 * estimate)
     memory.check_memory(gaits, schedule.duration)

@@ -141,7 +141,7 @@ def mean_peaks(simulation: Simulation, robot: int | None = None) -> dict[str, fl
     """
     log = simulation.strides
     steady = [
-        log.peak_error[k, max(0, count - STEADY_STRIDES) : count].mean(axis=0)
+        log["peak_error"][k, max(0, count - STEADY_STRIDES) : count].mean(axis=0)
         for k, count in enumerate(log.count)
         if robot in (None, k) and simulation.upright[k] and count
     ]

@@ -148,11 +148,11 @@ def _seed(
 
 def _strides(spec: ControllerSpec, speeds: Sequence[float], simulation: Simulation) -> pd.DataFrame:
     log, rows = simulation.strides, []
-    first = np.argmax(log.scalars["learning"] == 1, axis=1)
+    first = np.argmax(log["learning"] == 1, axis=1)
     length = int((log.count - first).min()) + 1  # as many of each robot
     for k, speed in enumerate(speeds):
         window = slice(first[k] - 1, first[k] - 1 + length)
-        peaks = log.peak_error[k, window]
+        peaks = log["peak_error"][k, window]
         legs = peaks.reshape(length, -1, len(JOINTS)).mean(axis=1)  # (length, 3)
         rows.append(
             pd.DataFrame(
@@ -161,7 +161,7 @@ def _strides(spec: ControllerSpec, speeds: Sequence[float], simulation: Simulati
                     "speed": speed,
                     "stride": np.arange(length),
                     **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
-                    "upright": log.scalars["upright"][k, window] == 1,
+                    "upright": log["upright"][k, window] == 1,
                 }
             )
         )
