@@ -24,8 +24,8 @@ from ...robot.formats import mujoco_spec
 from .ground import add_ground, name_feet
 from .mjcf import mjcf_spec
 from .motors import push_force
+from .payload import apply_payload
 from .scenario import Scenario
-from .trunk_mass import load_trunk
 from .trunk_state import Trunk
 
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -66,7 +66,7 @@ def build_model(
             trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         if base == "sagittal":
             trunk.add_joint(name="pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
-    load_trunk(trunk, scenario)
+    apply_payload(trunk, scenario)
     _add_motors(spec, robot, scenario, servo)
     name_feet(spec, robot)
     add_ground(spec, robot, scenario)
