@@ -527,7 +527,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "transfers of pd": (
         lambda: measure_transfers(load_controller("pd"), (0.0, 0.1, 0.2), scenario(), []),
-        "controller 'pd' does not learn; transfers need a controller that learns",
+        "controller 'pd' does not learn in stance; choose one with a law, as 'ilc'",
     ),
     "gains of no speed": (
         lambda: sweep_gains(load_controller("ilc"), (), scenario()),
@@ -733,10 +733,10 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["ilc", "analyze", "pd"], "controller 'pd' does not learn in stance; choose one with a law"),
     (["ilc", "analyze", "--scenario", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
     (["ilc", "analyze", "--figure", "a.doc"], "figures cannot be written as 'doc'; choose png"),
-    (["ilc", "gains", "pd"], "controller 'pd' does not learn; choose one that does, as 'ilc'"),
+    (["ilc", "gains", "pd"], "controller 'pd' does not learn in stance; choose one wi"),
     (["ilc", "gains", "--speed", "7"], "speed 7 m/s is outside the gait library"),
-    (["ilc", "transfer", "pd"], "controller 'pd' does not learn; transfers need a controller"),
-    (["ilc", "transfer", "--speed", "0", "0.1"], "transfers need three speeds or more: one betwe"),
+    (["ilc", "transfer", "pd"], "controller 'pd' does not learn in stance; choose one"),
+    (["ilc", "transfer", "--speed", "0", "0.1"], "transfer needs three speeds or more: one betwee"),
     (["ilc", "transfer", "--scenarios", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
     (["ilc", "transfer", "--speed", "0", "7", "8"], "speed 7 m/s is outside the gait library"),
     (["ilc", "seeding", "--speed", "0"], "seeding needs three speeds or more"),
