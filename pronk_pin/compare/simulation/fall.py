@@ -1,9 +1,10 @@
 """Falls: what counts as one.
 
 A robot has fallen once its trunk is too low, or tilted too far, or its state is not finite. It is
-simulated on, and counts as fallen to the end: `Player.upright`, the variable `upright` of the
-strides. Its strides are not learned from (`SKIPPED` in `control/learning/laws.py`: "fallen"); what
-is written of it is in `compare/report/verdict.py` and `limitations.py`.
+simulated on, and counts as fallen to the end: `Player.upright`, and the variable `upright` of the
+strides. Its strides are not learned from ("fallen" in `SKIPPED` of `control/learning/laws.py`).
+What a report says of falls is worded in `compare/report/verdict.py` ("No robot fell.") and
+`limitations.py`.
 """
 
 from __future__ import annotations

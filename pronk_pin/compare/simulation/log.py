@@ -225,7 +225,8 @@ class StrideLog:
             self._keep_ticks(part, rows[close], log, length[close])
 
     def _keep_ticks(self, part: int, rows: IntArray, log: TickLog, length: IntArray) -> None:
-        at = _compact(rows), slice(min(int(length.max()), self._ticks["tick_base"].shape[3]))
+        slot, size = self.count[rows] % LAST, self._ticks["tick_base"].shape[3]
+        at = _compact(rows), slice(min(int(length.max()), size))
         values = {
             "tick_joints": log.joints[at],
             "tick_joint_rates": log.joint_rates[at],
@@ -235,10 +236,9 @@ class StrideLog:
             "tick_base_rate": log.base_rate[at],
             "tick_force": log.force[at],
         }
-        slot = self.count[rows] % LAST
+        who, beyond = np.nonzero(np.arange(size) >= length[:, None])
         for name, array in self._ticks.items():
             array[rows, slot, part, at[1]] = values[name]
-            who, beyond = np.nonzero(np.arange(array.shape[3]) >= length[:, None])
             array[rows[who], slot[who], part, beyond] = np.nan
 
     def end(

@@ -170,7 +170,7 @@ def test_a_schedule_needs_time_for_a_stride() -> None:
     with pytest.raises(InvalidInput) as caught:
         Schedule(baseline=0.2, learning=0.1)
     assert str(caught.value) == (
-        "learning and learning of 0.2 + 0.1 s are too short for a stride; "
+        "baseline and learning of 0.2 + 0.1 s are too short for a stride; "
         "make them 1 s or more together"
     )
 
