@@ -1,8 +1,8 @@
 """The simulated scenario: robots in MuJoCo, from the same URDF, with the scenario's mismatches.
 
-The base is locked to the sagittal plane without rotation, as in the paper (section III): the trunk
-has two slides, x and z. `qpos` and `qvel` stay inside this module; what it takes and gives is in
-Pinocchio's order.
+With base `locked` the trunk has two slides, x and z, as in the paper (section III); with `sagittal`
+a hinge for its pitch besides; with `free` the free joint of the model. `qpos` and `qvel` stay
+inside this module; what it takes and gives is in Pinocchio's order.
 """
 
 from __future__ import annotations
