@@ -11,7 +11,7 @@ from ..._typing import Array, IntArray
 from ...control import Balance, ControllerSpec, PhaseLog, Tape, TouchdownDetector
 from ...gait import Gait
 from ...robot import Robot
-from ..world import Motion, Motors, Scenario, SensorSuite, World
+from ..world import Motion, Motors, Scenario, SensorSuite, World, level_specific_force
 from .fall import FallDetector
 from .log import TickLog
 from .playback import DelayedPlayback, FeedbackPlayback, Playback, Segment, ServoPlayback
@@ -148,15 +148,8 @@ class Player:
         phase = self.sensed.phase(rows, length, sensed=sensed)
         if not self._level_imu:
             return phase
-        # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
         rate = self.log.base_rate[rows, : int(length.max()) + 1]
-        if rate.shape[1] == int(length.max()):
-            rate = np.concatenate([rate, rate[:, -1:]], axis=1)
-        force = np.zeros((*rate[:, 1:].shape[:2], 3))
-        force[..., [0, 2]] = np.diff(rate, axis=1) / self.world.scenario.timestep
-        last = np.arange(len(rows)), length - 1
-        force[last] = force[last[0], np.maximum(length - 2, 0)]  # the log ends there
-        force -= self.world.scenario.gravity_vector
+        force = level_specific_force(self.world.scenario, rate, length)
         _, force = self.sensors.imu(rows, np.zeros_like(force), force)
         return replace(phase, specific_force=force)
 
