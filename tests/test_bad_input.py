@@ -33,6 +33,7 @@ from pronk_pin.compare import (
     run_experiment,
 )
 from pronk_pin.compare.simulation import memory
+from pronk_pin.compare.simulation.quantities import STRIDE_QUANTITIES
 from pronk_pin.compare.studies.gain_reduction import sweep_gains
 from pronk_pin.compare.studies.prediction import simulate_learning
 from pronk_pin.compare.studies.seeding import measure_seeding
@@ -526,7 +527,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "transfers of pd": (
         lambda: measure_transfers(load_controller("pd"), (0.0, 0.1, 0.2), scenario(), []),
-        "controller 'pd' does not learn; transfers need a controller that learns",
+        "controller 'pd' does not learn in stance; choose one with a law, as 'ilc'",
     ),
     "gains of no speed": (
         lambda: sweep_gains(load_controller("ilc"), (), scenario()),
@@ -630,8 +631,7 @@ def test_what_does_not_fit_into_memory_is_refused_with_the_estimate_and_the_reme
     schedule = Schedule(baseline=100.0, learning=100.0)
     simulation = simulated(gaits=gaits, schedule=replace(schedule))
     log, estimate = simulation.strides, memory.log_size(gaits, schedule.duration)
-    arrays = [*log.scalars.values(), *log.curves.values(), log.base, log.attitude]
-    arrays += [log.peak_error, log.rms_error, log.contact_error]
+    arrays = [log[quantity.name] for quantity in STRIDE_QUANTITIES]
     assert estimate == pytest.approx(sum(array.nbytes for array in arrays), rel=0.02)
     monkeypatch.setattr(memory, "memory", lambda: 4.0 * estimate)
     memory.check_memory(gaits, schedule.duration)
@@ -733,10 +733,10 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["ilc", "analyze", "pd"], "controller 'pd' does not learn in stance; choose one with a law"),
     (["ilc", "analyze", "--scenario", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
     (["ilc", "analyze", "--figure", "a.doc"], "figures cannot be written as 'doc'; choose png"),
-    (["ilc", "gains", "pd"], "controller 'pd' does not learn; choose one that does, as 'ilc'"),
+    (["ilc", "gains", "pd"], "controller 'pd' does not learn in stance; choose one wi"),
     (["ilc", "gains", "--speed", "7"], "speed 7 m/s is outside the gait library"),
-    (["ilc", "transfer", "pd"], "controller 'pd' does not learn; transfers need a controller"),
-    (["ilc", "transfer", "--speed", "0", "0.1"], "transfers need three speeds or more: one betwe"),
+    (["ilc", "transfer", "pd"], "controller 'pd' does not learn in stance; choose one"),
+    (["ilc", "transfer", "--speed", "0", "0.1"], "transfer needs three speeds or more: one betwee"),
     (["ilc", "transfer", "--scenarios", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
     (["ilc", "transfer", "--speed", "0", "7", "8"], "speed 7 m/s is outside the gait library"),
     (["ilc", "seeding", "--speed", "0"], "seeding needs three speeds or more"),

@@ -13,7 +13,6 @@ from ..._checks import Interval, reals, whole
 from ..._typing import Array
 from ...control import (
     ControllerSpec,
-    LearningLaw,
     LiftedModel,
     ModelBasedILC,
     PlanarStrides,
@@ -29,8 +28,10 @@ from ...errors import InvalidInput
 from ...gait import load_library
 from ...robot import JOINTS, load_robot
 from ..experiment import Results
+from ..report import number
 from ..simulation import Schedule, simulate
 from ..world import Scenario
+from .learning_runs import learning_law
 
 _BASELINE = 6.0
 _WIDTH = 96
@@ -80,7 +81,7 @@ def simulate_learning(
     Raises:
         InvalidInput: The controller does not learn in stance.
     """
-    _law(spec)
+    learning_law(spec)
     speeds, strides = reals("speeds", speeds), whole("strides", strides, STRIDES)
     if not speeds:
         raise InvalidInput("no speeds; give at least one")
@@ -113,7 +114,7 @@ def stored_learning(
     Raises:
         InvalidInput: More was learned than the prediction covers, or elsewhere.
     """
-    _law(spec)
+    learning_law(spec)
     experiment = results.experiment
     if not _covered(spec):
         suitable = [name for name in experiment.controllers if _covered(load_controller(name))]
@@ -157,7 +158,7 @@ def compare_prediction(
     Raises:
         InvalidInput: The controller does not learn, or there are no strides before its learning.
     """
-    law = _law(spec)
+    law = learning_law(spec)
     robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
     settings = StrideSettings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
     rotors = Rotors(scenario.armature, scenario.damping)
@@ -197,7 +198,7 @@ def describe_prediction(prediction: Prediction) -> str:
         f"  transient growth          {analysis.transient:8.3f}",
         "  error left in the limit   "
         + ", ".join(
-            f"{joint} {_percent(value)}"
+            f"{joint} {number(value, '.1%')}"
             for joint, value in zip(JOINTS, analysis.limit, strict=True)
         ),
         "  radius with other motors  "
@@ -236,14 +237,6 @@ def _factor(one: Array, other: Array) -> Array:
     return np.asarray(np.maximum(a / b, b / a))
 
 
-def _law(spec: ControllerSpec) -> LearningLaw:
-    if spec.law is None:
-        raise InvalidInput(
-            f"controller '{spec.name}' does not learn in stance; choose one with a law, as 'ilc'"
-        )
-    return spec.law
-
-
 def _covered(spec: ControllerSpec) -> bool:
     """Whether the law of the stance is all that a controller learns by."""
     return spec.law is not None and spec.flight_law is None and spec.timing is None
@@ -280,7 +273,3 @@ def _by_joint(error: Array) -> Array:
     """RMS over the phase and the legs: (strides, samples, 12) becomes (strides, 3)."""
     legs = error.reshape(*error.shape[:2], -1, len(JOINTS)).astype(float)
     return np.asarray(np.sqrt((legs**2).mean(axis=(1, 2))))
-
-
-def _percent(value: float) -> str:
-    return f"{value:.1%}" if np.isfinite(value) else "-"

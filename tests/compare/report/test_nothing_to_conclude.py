@@ -7,15 +7,13 @@ import shutil
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
-from pronk_pin.compare import Results, Simulation, summarize
+from pronk_pin.compare import Results, summarize
 from pronk_pin.compare.metrics.statistics import compare_controllers
 from pronk_pin.compare.metrics.time_to_beat import lessons, peak_history
 from pronk_pin.compare.report.difference import format_changes
@@ -27,7 +25,8 @@ from pronk_pin.compare.report.tables import (
     worst_reduction,
 )
 from pronk_pin.compare.report.verdict import format_suite, format_tables, suite_verdict, verdict
-from pronk_pin.compare.studies.gain_reduction import describe_gains, mean_peaks
+from pronk_pin.compare.studies.gain_reduction import describe_gains
+from pronk_pin.compare.studies.learning_runs import mean_peaks
 from pronk_pin.compare.studies.reproduce import format_reproduction
 from pronk_pin.compare.studies.seeding import LEARNERS, describe_seeding
 from pronk_pin.compare.studies.transfer import describe_transfers
@@ -353,10 +352,14 @@ def test_a_transfer_to_where_practice_falls_is_open() -> None:
 
 def test_peaks_of_a_sweep_are_those_of_the_robots_that_stayed_up() -> None:
     peaks = np.ones((2, 5, 12)) * np.array([0.1, 7.0])[:, None, None]
-    log = SimpleNamespace(peak_error=peaks, count=np.array([5, 5]))
 
     def found(upright: list[bool]) -> dict[str, float | int]:
-        return mean_peaks(cast(Simulation, SimpleNamespace(strides=log, upright=np.array(upright))))
+        variables = {
+            "count": ("speed", [5, 5]),
+            "peak_error": (("speed", "stride", "joint"), peaks),
+            "upright": (("speed", "stride"), np.outer(upright, np.ones(5))),
+        }
+        return mean_peaks(xr.Dataset(variables))
 
     assert found([True, False])["calf"] == pytest.approx(0.1)
     assert found([True, False])["upright"] == 1
