@@ -212,7 +212,7 @@ class LiveServer:
         self.send(stream_row(self.scene, time))
 
     def send(self, row: bytes) -> None:
-        """Hand an instant (see `documents.row_bytes`) to the open pages, and return at once."""
+        """Hand an instant (see `row_bytes`) to the open pages, and return at once."""
         self._last = row
         self._loop.call_soon_threadsafe(self._broadcast, row)
 

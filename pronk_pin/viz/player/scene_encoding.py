@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 
 from ..._typing import Array
 from ..figure_style import SEQUENTIAL
-from ..scenes import GHOST_COLOR, Color, Mesh, Scene, Track
+from ..scenes import GHOST_COLOR, Color, Scene, Track
 from .packing import pack
 
 FPS = 60.0
@@ -22,13 +22,9 @@ _USE_STEPS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 
 
 def robot_blob(scene: Scene) -> bytes:
-    """Static part of a scene for the page: meshes, joints, names, colours."""
+    """Static part of a scene for the page: shapes, joints, names, colours."""
     look, robot = scene.appearance, scene.robot
-    meshes: list[Mesh] = []
-    for part in look.parts:
-        if not any(part.mesh is mesh for mesh in meshes):
-            meshes.append(part.mesh)
-    index = {id(mesh): i for i, mesh in enumerate(meshes)}
+    shapes = list(dict.fromkeys(part.shape for part in look.parts))
     names = [joint.name for joint in look.joints]
     return pack(
         {
@@ -46,12 +42,12 @@ def robot_blob(scene: Scene) -> bytes:
                     "name": part.name,
                     "joint": part.joint,
                     "placement": _matrix(part.placement),
-                    "mesh": index[id(part.mesh)],
+                    "shape": shapes.index(part.shape),
                     "color": css(part.color),
                 }
                 for part in look.parts
             ],
-            "meshes": [{"vertices": m.vertices, "faces": m.faces} for m in meshes],
+            "shapes": [vars(shape) for shape in shapes],
             "jointNames": [name.removesuffix("_joint") for name in names],
             "shown": _shown_joint(names),
             "legs": list(robot.legs),
