@@ -338,20 +338,6 @@ def _give(what: str, within: Interval) -> str:
     return f"give a {what} {words}" if words else f"give a {what} that is finite"
 
 
-_MOST_WORKERS = 1024
-
-
 def worker_count(workers: int | None) -> int:
-    """Number of worker processes; None for one for each core.
-
-    Raises:
-        InvalidInput: Not a whole number, or none, or more than any machine has.
-    """
-    if workers is None:
-        return os.cpu_count() or 1
-    workers = whole("workers", workers)
-    if workers < 1:
-        raise InvalidInput(f"{workers} workers; at least one is needed")
-    if workers > _MOST_WORKERS:
-        raise InvalidInput(f"{workers} workers; give {_MOST_WORKERS} or fewer")
-    return workers
+    """Number of worker processes, no more than any machine has; None for one for each core."""
+    return none_or(whole, "workers", workers, Interval(1, 1024)) or os.cpu_count() or 1

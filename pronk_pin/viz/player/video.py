@@ -14,12 +14,12 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
-from ..._checks import flag, none_or, real, text, whole
+from ..._checks import NOT_NEGATIVE, POSITIVE, flag, none_or, real, text, whole
 from ...errors import FileProblem, InvalidInput, cannot_write
 from ...storage import partial_path, temporary_folder, write_file
 from ..scenes import Scene
 from .browser import Browser
-from .replay import write_replay
+from .replay import RATE, write_replay
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,7 @@ class Film:
 
     def __post_init__(self) -> None:
         flag("plots", self.plots)
-        for name, most in (("fps", 1000.0), ("rate", 1000.0)):
-            if not 0.0 < real(name, getattr(self, name)) <= most:
-                raise InvalidInput(
-                    f"{name} must be positive, not {getattr(self, name)}; and {most:g} at most"
-                )
+        real("fps", self.fps, RATE), real("rate", self.rate, RATE)
         for name in ("width", "height"):
             if not 64 <= whole(name, getattr(self, name)) <= 4096 or getattr(self, name) % 2:
                 raise InvalidInput(
@@ -60,9 +56,7 @@ class Film:
                 )
         if text("color", self.color) not in ("", "error", "torque"):
             raise InvalidInput(f"color='{self.color}'; choose error or torque, or leave it out")
-        real("at", self.at), none_or(real, "seconds", self.seconds)
-        if self.at < 0.0 or (self.seconds is not None and self.seconds <= 0.0):
-            raise InvalidInput("at must not be negative, and seconds must be positive")
+        real("at", self.at, NOT_NEGATIVE), none_or(real, "seconds", self.seconds, POSITIVE)
 
     def times(self, duration: float) -> list[float]:
         """The instants of the film of a scene of that duration [s], from its beginning."""

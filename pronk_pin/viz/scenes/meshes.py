@@ -7,7 +7,7 @@ process; a page with two robots then fits into two megabytes.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import TypeAlias
 
 import coal
@@ -104,11 +104,6 @@ class Appearance:
     robot: Robot
     joints: tuple[Joint, ...]
     parts: tuple[Part, ...]
-
-    @cached_property
-    def tips(self) -> tuple[int, ...]:
-        """Number of the joint that carries each foot."""
-        return tuple(int(self.robot.model.frames[foot].parentJoint) for foot in self.robot.foot_ids)
 
     def feet(self, q: Array) -> Array:
         """Centres of the feet in the world [m], shape (n, 4, 3), of configurations (n, 19)."""
