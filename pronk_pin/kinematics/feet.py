@@ -21,6 +21,7 @@ from ..robot import (
     as_q,
     as_robot,
     as_state,
+    by_state,
     leg_indices,
     rotation_matrix,
 )
@@ -63,27 +64,13 @@ def foot_positions(robot: Robot, q: npt.ArrayLike) -> Array:
         pin.framesForwardKinematics(model, data, row)
         return [placements[foot].translation for foot in ids]
 
-    if q.ndim == 1:
-        return np.array(feet(q))
-    positions = np.empty((*q.shape[:-1], len(ids), 3))
-    for row, out in zip(q.reshape(-1, robot.nq), positions.reshape(-1, len(ids), 3), strict=True):
-        out[:] = feet(row)
-    return positions
+    return by_state(feet, (len(ids), 3), q)
 
 
 def foot_velocities(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
-    """Velocities of the feet's centres in the world: the middle of eq. (3); batched.
+    """Velocities of the feet's centres in the world: the middle of eq. (3) [m/s]; batched.
 
-    Args:
-        robot: The robot.
-        q: Configuration, shape (..., 19).
-        v: Velocity, shape (..., 18).
-
-    Returns:
-        Velocities [m/s], shape (..., 4, 3), in the order of `robot.legs`.
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    As `foot_positions`, with the velocity v, shape (..., 18).
     """
     q, v = as_state(robot, q, v)
     model, data, ids, world = robot.model, robot.data, robot.foot_ids, pin.LOCAL_WORLD_ALIGNED
@@ -92,13 +79,7 @@ def foot_velocities(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
         pin.forwardKinematics(model, data, q_row, v_row)
         return [pin.getFrameVelocity(model, data, foot, world).linear for foot in ids]
 
-    if q.ndim == 1:
-        return np.array(feet(q, v))
-    velocities = np.empty((*q.shape[:-1], len(ids), 3))
-    states = q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), velocities.reshape(-1, len(ids), 3)
-    for q_row, v_row, out in zip(*states, strict=True):
-        out[:] = feet(q_row, v_row)
-    return velocities
+    return by_state(feet, (len(ids), 3), q, v)
 
 
 def leg_inverse_kinematics(
