@@ -247,12 +247,12 @@ class LiveServer:
 
     async def film(self, choice: dict[str, str]) -> bytes:
         """The film of a choice; films are made one after the other, aside from the pages."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._worker, self._film, choice)
 
-    def _film(self, choice: dict[str, str]) -> bytes:
-        first = choice == dict(self.menu.first)
-        return film_blob(self.scene if first else self.menu.scene(choice))
+        def make() -> bytes:
+            first = choice == dict(self.menu.first)
+            return film_blob(self.scene if first else self.menu.scene(choice))
+
+        return await asyncio.get_running_loop().run_in_executor(self._worker, make)
 
 
 class _Application(tornado.web.Application):
