@@ -232,7 +232,7 @@ def keep_reals(owner: object, intervals: Mapping[str, Interval], prefix: str = "
 
 
 def keep_vectors(
-    owner: object, intervals: Mapping[str, Interval], length: int = 3, prefix: str = ""
+    owner: object, intervals: Mapping[str, Interval], length: int | None = 3, prefix: str = ""
 ) -> None:
     """Check attributes of a frozen dataclass that are so many numbers, and keep them as tuples."""
     for name, within in intervals.items():
