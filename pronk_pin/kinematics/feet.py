@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,7 @@ from ..robot import (
     leg_indices,
     rotation_matrix,
 )
+from .contacts import Contact, contact_radius
 from .legs import Hip, Knee, LegGeometry, leg_angles, leg_geometry, leg_motion
 
 _ROUND_OFF = 1e-9
@@ -120,7 +121,7 @@ def leg_odometry(
     v: npt.ArrayLike,
     *,
     feet: Iterable[str] | None = None,
-    contact: Literal["point", "rolling"] = "rolling",
+    contact: Contact = "rolling",
 ) -> Array:
     """Trunk velocity from legs that stand without slipping; closed form, batched.
 
@@ -149,7 +150,7 @@ def leg_odometry(
     stance = leg_indices(robot, feet)
     if not stance:
         raise InvalidInput("odometry needs at least one leg in stance; feet is empty")
-    known_name("contact", contact, ("point", "rolling"))
+    radius = contact_radius(robot, contact)
     shape = (*q.shape[:-1], len(robot.legs), len(JOINTS))
     legs = leg_motion(leg_geometry(robot), q[..., 7:].reshape(shape), v[..., NB:].reshape(shape))
     rotation = rotation_matrix(q[..., 3:7])
@@ -157,8 +158,8 @@ def leg_odometry(
     position, velocity, calf_rate = (motion[..., stance, :].mean(axis=-2) for motion in legs)
     spin = v[..., 3:NB]
     trunk = -velocity - np.cross(spin, position)  # (..., 3), in the trunk
-    if contact == "rolling":
-        trunk += np.cross(spin + calf_rate, robot.foot_radius * rotation[..., 2, :])
+    if radius:
+        trunk += np.cross(spin + calf_rate, radius * rotation[..., 2, :])
     return np.asarray(np.einsum("...ij,...j->...i", rotation, trunk))
 
 

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 
 from ..._typing import Array
 from ..figure_style import SEQUENTIAL
-from ..scenes import GHOST_COLOR, Color, Scene, Track
+from ..scenes import GHOST_COLOR, Scene, Track
 from .packing import pack
 
 FPS = 60.0
@@ -43,7 +43,7 @@ def robot_blob(scene: Scene) -> bytes:
                     "joint": part.joint,
                     "placement": _matrix(part.placement),
                     "shape": shapes.index(part.shape),
-                    "color": css(part.color),
+                    "color": to_hex(part.color),
                 }
                 for part in look.parts
             ],
@@ -93,17 +93,12 @@ def row_bytes(scene: Scene, rows: list[dict[str, Array]], view: Array) -> bytes:
     return np.concatenate(values).astype("<f4").tobytes()
 
 
-def css(color: Color) -> str:
-    """A colour as `#rrggbb`."""
-    return str(to_hex(color))
-
-
 def _track(track: Track, row: dict[str, Array]) -> dict[str, Any]:
     color = track.color or (GHOST_COLOR if track.ghost else None)
     return {
         "name": track.name,
         "ghost": track.ghost,
-        "color": css(color) if color else None,
+        "color": to_hex(color) if color else None,
         "caption": track.caption,
         "marks": [list(mark) for mark in track.marks],
         "channels": list(track.channels),
