@@ -59,17 +59,17 @@ class Interval:
     def __str__(self) -> str:
         """In words: "from 0 to 10 kg", "above 0", "from 1 on"."""
         unit = f" {self.unit}" if self.unit else ""
-        low, high = (f"{end:.15g}" for end in (self.low, self.high))
+        first = f"{'above' if self.above else 'from'} {self.low:.15g}"
+        last = f"{'below' if self.below else 'up to'} {self.high:.15g}"
         if math.isinf(self.low) and math.isinf(self.high):
-            return unit.strip() and f"in {self.unit}"
+            return unit and f"in{unit}"
         if math.isinf(self.high):
-            return f"above {low}{unit}" if self.above else f"from {low}{unit} on"
+            return f"{first}{unit}" if self.above else f"{first}{unit} on"
         if math.isinf(self.low):
-            return f"{'below' if self.below else 'up to'} {high}{unit}"
-        last = f"below {high}" if self.below else f"up to {high}"
-        if self.above:
-            return f"above {low}, {last}{unit}"
-        return f"from {low}, {last}{unit}" if self.below else f"from {low} to {high}{unit}"
+            return f"{last}{unit}"
+        if self.above or self.below:
+            return f"{first}, {last}{unit}"
+        return f"{first} to {self.high:.15g}{unit}"
 
 
 ANY = Interval()
