@@ -20,6 +20,7 @@ from .paper_table import table_1
 from .statistics import (
     CONFIDENCE,
     LEAST_UNITS,
+    NO_INTERVAL,
     Interval,
     compare_controllers,
     compare_pairs,
@@ -48,6 +49,7 @@ __all__ = [
     "KEYS",
     "LEARNER",
     "LEAST_UNITS",
+    "NO_INTERVAL",
     "RIVAL",
     "STEADY_STRIDES",
     "VARIABLES",

@@ -6,7 +6,8 @@ Goes out: tables and text for a terminal and for the report.
 
 from .difference import format_changes
 from .limitations import limitations
-from .tables import SHOWN, SHOWN_PARAMETERS, answer, beside_the_paper, sampled_scenarios
+from .overview import ControllerOverview, JointOverview, Overview, answer, overview
+from .tables import SHOWN, SHOWN_PARAMETERS, beside_the_paper, sampled_scenarios
 from .verdict import (
     against_model,
     answer_in_words,
@@ -24,6 +25,9 @@ from .verdict import (
 __all__ = [
     "SHOWN",
     "SHOWN_PARAMETERS",
+    "ControllerOverview",
+    "JointOverview",
+    "Overview",
     "against_model",
     "answer",
     "answer_in_words",
@@ -37,6 +41,7 @@ __all__ = [
     "format_tables",
     "limitations",
     "number",
+    "overview",
     "sampled_scenarios",
     "units_of_intervals",
     "verdict",

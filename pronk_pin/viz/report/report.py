@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import shlex
 import textwrap
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from ...compare.metrics import (
 )
 from ...compare.report import (
     SHOWN,
+    Overview,
     answer,
     answer_in_words,
     beside_note,
@@ -101,12 +103,12 @@ def report(results: Results) -> Document:
     """The report as a document."""
     summary, scenarios = results.summary(), families(results.experiment.scenarios)
     document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
-    table = answer(summary)
-    document.text(answer_in_words(summary, table=table), "verdict")
+    tables = answer(summary)
+    document.text(answer_in_words(summary, tables=tables), "verdict")
     if len(scenarios) > 1:
-        _all_scenarios(document, results, table)
+        _all_scenarios(document, results, tables)
     for scenario in scenarios:
-        _world(document, results, summary, table, scenario)
+        _world(document, results, summary, tables[scenario], scenario)
     if results.foreign is not None:
         _foreign_robot(document, results.foreign)
     document.heading("How to read the numbers", "statistics")
@@ -188,25 +190,24 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     ]
 
 
-def _all_scenarios(document: Document, results: Results, table: pd.DataFrame) -> None:
+def _all_scenarios(document: Document, results: Results, tables: Mapping[str, Overview]) -> None:
     """What comes out over all scenarios: a row a scenario, the heat map, and the learning."""
     document.heading("All scenarios", "scenarios")
-    controllers = set(table.index.get_level_values("controller"))
-    if LEARNER in controllers:
+    if any(LEARNER in table for table in tables.values()):
         document.text("a row a scenario: peak error under learning (ILC) beside PD and the model.")
-        document.table(report_tables.by_scenario(table))
-    for name, (figure, caption) in _suite_figures(results, table).items():
+        document.table(report_tables.by_scenario(tables))
+    for name, (figure, caption) in _suite_figures(results, tables).items():
         document.picture(name, figure, caption)
 
 
 def _suite_figures(
-    results: Results, table: pd.DataFrame | None = None
+    results: Results, tables: Mapping[str, Overview] | None = None
 ) -> dict[str, tuple[Figure, str]]:
     """Figures over all scenarios with their captions."""
-    table = answer(results.summary()) if table is None else table
+    tables = answer(results.summary()) if tables is None else tables
     return {
         "heat-map": (
-            figures.heat_map(table),
+            figures.heat_map(tables),
             "Mean peak stance error by scenario and controller, in milliradians.",
         ),
         **_learning_figures(results),
@@ -231,7 +232,7 @@ def _learning_figures(results: Results) -> dict[str, tuple[Figure, str]]:
 
 
 def _world(
-    document: Document, results: Results, summary: pd.DataFrame, table: pd.DataFrame, scenario: str
+    document: Document, results: Results, summary: pd.DataFrame, table: Overview, scenario: str
 ) -> None:
     """The section about one scenario; the first one has all figures."""
     scenarios = families(results.experiment.scenarios)
@@ -239,10 +240,10 @@ def _world(
     where = f"{len(drawn)} sampled scenarios" if sampled(scenario) else "scenario"
     document.heading(f'Controllers in the {where} "{scenario}"', scenario)
     if len(scenarios) > 1:
-        document.text(verdict(summary, scenario=scenario, table=table.loc[scenario]))
-    document.table(report_tables.errors(table.loc[scenario]))
-    document.table(report_tables.motion(table.loc[scenario]))
-    units = units_of_intervals(table.loc[scenario])
+        document.text(verdict(summary, scenario=scenario, table=table))
+    document.table(report_tables.errors(table))
+    document.table(report_tables.motion(table))
+    units = units_of_intervals(table)
     document.text(f"Intervals are drawn over the {units}." if units else "", "note")
     if sampled(scenario):
         _sampled(document, results, summary, scenario)
@@ -253,7 +254,7 @@ def _world(
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
     if {"pd", LEARNER} <= set(results.experiment.controllers):
         document.heading("Table I, beside the paper's", f"{scenario}-table", level=3)
-        _beside(document, beside_the_paper(summary, scenario=scenario), table.loc[scenario])
+        _beside(document, beside_the_paper(summary, scenario=scenario), table)
     if LEARNER in results.experiment.controllers:
         document.heading("Before and after, and what was learned", f"{scenario}-learned", level=3)
         if "tracking" not in found:
@@ -263,7 +264,7 @@ def _world(
                 document.picture(name, found[name], _CAPTIONS[name])
 
 
-def _beside(document: Document, beside: pd.DataFrame, table: pd.DataFrame) -> None:
+def _beside(document: Document, beside: pd.DataFrame, table: Overview) -> None:
     """Our errors beside the paper's Table I, and who is missing there."""
     document.text(beside_note(table), "note")
     if beside.empty:
