@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -20,7 +21,7 @@ from ..compare import (
     mjcf_parity,
     run_experiment,
 )
-from ..compare.experiment import check_demand, known_address, load_suite
+from ..compare.experiment import SUITES, check_demand, known_address, load_suite
 from ..compare.identification import DRAWS, IMU_NOISE, check_learner
 from ..compare.report import families, format_changes, format_suite, format_tables
 from ..compare.studies import close_loop, format_loop, format_reproduction
@@ -199,6 +200,26 @@ class Explain:
             known_format(self.figure.suffix.removeprefix("."))
 
 
+def command_line(experiment: Experiment) -> str:
+    """The command that runs an experiment."""
+    for name in SUITES:
+        if load_suite(name) == experiment:
+            return f"pronk-pin compare --suite {name}"
+    words = ["pronk-pin compare", f"--robot {experiment.robot}"]
+    words += ["--speeds " + " ".join(f"{speed:g}" for speed in experiment.speeds)]
+    words += ["--controllers " + " ".join(experiment.controllers)]
+    words += ["--scenarios " + " ".join(experiment.scenarios)]
+    words += ["--seeds " + " ".join(map(str, experiment.seeds))]
+    words += [f"--base {experiment.base}"]
+    words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []
+    schedule = experiment.schedule
+    words += [
+        f"--schedule.{name} {getattr(schedule, name):g}"
+        for name in ("startup", "baseline", "learning", "scatter")
+    ]
+    return " ".join(words)
+
+
 def _print_tables(results: Results) -> None:
     """Table I, overview and verdict of one scenario; the overviews of many and one verdict."""
     summary, scenarios = results.summary(), families(results.experiment.scenarios)
@@ -211,7 +232,7 @@ def _print_tables(results: Results) -> None:
 def _write_pages(results: Results) -> None:
     """The report and the replay of a result, with their names printed."""
     print(f"\nresults  {results.folder}")
-    print(f"report   {write_report(results)}")
+    print(f"report   {write_report(results, command=command_line(results.experiment))}")
     try:
         replay = str(write_replay(result_menu(results), results.folder / "replay.html"))
     except InvalidInput as error:  # no stride was finished

@@ -5,7 +5,6 @@ One document, written as a self-contained report.html and as report.md with its 
 
 from __future__ import annotations
 
-import shlex
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +15,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ...compare import ForeignRobot, Results
-from ...compare.experiment import SUITES, load_suite
 from ...compare.metrics import (
     CONFIDENCE,
     LEARNER,
@@ -77,8 +75,16 @@ _READING = (
 )
 
 
-def write_report(results: Results) -> Path:
+_AGAIN = 'run_experiment(Results.load(folder).experiment, "again")'
+"""How Python makes a result again."""
+
+
+def write_report(results: Results, *, command: str = "") -> Path:
     """Write report.html, report.md and its figures into the results folder.
+
+    Args:
+        results: The results.
+        command: The command that makes them again; without one the report says how Python does.
 
     Returns:
         The path of report.html.
@@ -86,7 +92,7 @@ def write_report(results: Results) -> Path:
     Raises:
         FileProblem: The summary or the strides are missing or damaged, or it cannot be written.
     """
-    document = report(results)
+    document = report(results, command=command)
     path = results.write("report.html", document.to_html())
     folder = results.folder / FIGURES
     try:
@@ -99,8 +105,8 @@ def write_report(results: Results) -> Path:
     return path
 
 
-def report(results: Results) -> Document:
-    """The report as a document."""
+def report(results: Results, *, command: str = "") -> Document:
+    """The report as a document, see `write_report`."""
     summary, scenarios = results.summary(), families(results.experiment.scenarios)
     document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
     tables = answer(summary)
@@ -115,29 +121,8 @@ def report(results: Results) -> Document:
     document.text(_READING)
     document.heading("Known limitations", "limits")
     document.bullets(limitations(results))
-    _provenance(document, results)
+    _provenance(document, results, command)
     return document
-
-
-def command(results: Results) -> str:
-    """The command that makes this result again."""
-    experiment = results.experiment
-    for name in SUITES:
-        if load_suite(name) == experiment:
-            return f"pronk-pin compare --suite {name}"
-    words = ["pronk-pin compare", f"--robot {experiment.robot}"]
-    words += ["--speeds " + " ".join(f"{speed:g}" for speed in experiment.speeds)]
-    words += ["--controllers " + " ".join(experiment.controllers)]
-    words += ["--scenarios " + " ".join(experiment.scenarios)]
-    words += ["--seeds " + " ".join(map(str, experiment.seeds))]
-    words += [f"--base {experiment.base}"]
-    words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []
-    schedule = experiment.schedule
-    words += [
-        f"--schedule.{name} {getattr(schedule, name):g}"
-        for name in ("startup", "baseline", "learning", "scatter")
-    ]
-    return " ".join(words)
 
 
 def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
@@ -331,13 +316,15 @@ def _sampled(document: Document, results: Results, summary: pd.DataFrame, scenar
         document.picture(name, figure, caption)
 
 
-def _provenance(document: Document, results: Results) -> None:
+def _provenance(document: Document, results: Results, command: str) -> None:
     document.heading("Where these numbers come from", "provenance")
     document.text(
-        "Made again by this command, to the bit with the same versions, the same BLAS kernel and a "
-        "processor of the same family:"
+        f"Made again by this {'command' if command else 'code'}, to the bit with the same "
+        "versions, the same BLAS kernel and a processor of the same family:"
     )
-    lines = textwrap.wrap(command(results), 96, break_long_words=False, break_on_hyphens=False)
+    lines = [_AGAIN]
+    if command:
+        lines = textwrap.wrap(command, 96, break_long_words=False, break_on_hyphens=False)
     document.text(" \\\n    ".join(lines), "code")
     document.text(
         "Every number stands in `summary.csv`, every stride in `strides/`, when they were made and "
