@@ -4,6 +4,7 @@ Comes in: a `StrideRecord`, and a `LiftedModel` for laws that need one.
 Goes out: the next stride's feedforward, and torque libraries of what was learned.
 """
 
+from .guard import GuardState, LearningGuard, Memory
 from .laws import (
     SKIPPED,
     CurrentIterationILC,
@@ -24,9 +25,12 @@ from .torque_library import InitialFeedforward, TorqueLibrary
 __all__ = [
     "SKIPPED",
     "CurrentIterationILC",
+    "GuardState",
     "InitialFeedforward",
+    "LearningGuard",
     "LearningLaw",
     "LiftedModel",
+    "Memory",
     "ModelBasedILC",
     "NormOptimalILC",
     "PDTypeILC",
