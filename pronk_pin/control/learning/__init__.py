@@ -4,6 +4,7 @@ Comes in: a `StrideRecord`, and a `LiftedModel` for laws that need one.
 Goes out: the next stride's feedforward, and torque libraries of what was learned.
 """
 
+from .guard import GuardState, LearningGuard, Memory
 from .laws import (
     FLIGHT_LAW,
     SKIPPED,
@@ -28,10 +29,13 @@ __all__ = [
     "FLIGHT_LAW",
     "SKIPPED",
     "CurrentIterationILC",
+    "GuardState",
     "InitialFeedforward",
     "LawContext",
+    "LearningGuard",
     "LearningLaw",
     "LiftedModel",
+    "Memory",
     "ModelBasedILC",
     "NormOptimalILC",
     "PDTypeILC",
