@@ -20,7 +20,9 @@ from .controller_spec import ControllerSpec
 from .feedback import SpeedEstimator
 from .learning import (
     SKIPPED,
+    GuardState,
     LawContext,
+    Memory,
     anti_windup,
     bound,
     delivered,
@@ -78,6 +80,7 @@ class Controller:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
         balance: The balance of a trunk that may turn; None where it is locked.
+        guard: The guard of the learning; None without one.
         skipped: Reason not to learn from the robots' last strides, index into `SKIPPED`,
             shape (n,).
     """
@@ -117,6 +120,9 @@ class Controller:
         context = self._context()
         self._laws = [bound(law, context) for law in spec.laws]
         self.balance = spec.balance.bind(context)
+        self.guard = None
+        if spec.guard is not None:
+            self.guard = GuardState(spec.guard, Memory(self.feedforward, self._flight.duration))
         self._always_retimes = flight is None and not any(self._laws)
         end = np.array([1.0])
         self._lift_off_speed = np.array(
@@ -166,7 +172,10 @@ class Controller:
                 default none does.
         """
         usable = self.skipped[rows] == 0
-        learns = usable & learning if learning is not None else np.zeros(len(rows), dtype=bool)
+        learns = np.zeros(len(rows), dtype=bool)
+        if learning is not None:
+            learns = usable & learning
+            learns[learning] &= ~self._roll_back(rows[learning], usable[learning])
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
         reference, position = self._stance, self._stance.position[rows]
@@ -286,6 +295,26 @@ class Controller:
         kept, rate = resample(kept, index), resample(rate, index)
         return record.less(kept, rate, self.spec.gains.feedback(kept, rate))
 
+    def _roll_back(self, rows: IntArray, usable: BoolArray) -> BoolArray:
+        """Let the guard judge the last strides of robots that learn; those that grew go back.
+
+        Args:
+            rows: Which robots.
+            usable: Whether their last strides can be learned from, shape (m,).
+
+        Returns:
+            Which of them went back, shape (m,).
+        """
+        if self.guard is None:
+            return np.zeros(len(rows), dtype=bool)
+        squares = [np.mean(last.error[rows] ** 2, axis=(1, 2)) for last in self._last]
+        played = Memory(self.feedforward[rows], self._flight.duration[rows])
+        back = self.guard.judge(rows, usable, np.sqrt(np.mean(squares, axis=0)), played)
+        who = rows[back]
+        self.feedforward[who] = self.guard.best.feedforward[who]
+        self._flight.stretch(who, self.guard.best.flight[who])
+        return back
+
     def _learn(self, rows: IntArray) -> None:
         """Update the feedforward of some robots from their last stride."""
         for part, law in enumerate(self._laws):
@@ -294,6 +323,9 @@ class Controller:
                 learned = learned_by(
                     law, self._learnable_record(part, rows, record), self.spec.name
                 )
+                if self.guard is not None:
+                    step = self.guard.step[rows, None, None]
+                    learned = record.feedforward + step * (learned - record.feedforward)
                 self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
 
     def _learnable_record(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
@@ -303,7 +335,7 @@ class Controller:
             # What the end of a flight does shows in the stance that follows it, which is yet to
             # come; it will be like the last one.
             ratio = self._flight.duration[rows] / self._stance.duration[rows]
-            learnable = learnable.onward(self._last[0].take(rows), ratio)
+            learnable = learnable.onward(self._last[0].take(rows), ratio, self.spec.coupling)
             if self.balance is not None:
                 share = self.spec.balance.landing
                 learnable = learnable.changed(lambda values: share * values)
@@ -316,4 +348,7 @@ class Controller:
             following = self.spec.timing.next(
                 flight.duration[rows], self._flight_measured[rows], flight.planned[rows]
             )
+            if self.guard is not None:
+                step = self.guard.step[rows]
+                following = flight.duration[rows] + step * (following - flight.duration[rows])
             flight.stretch(rows, following)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from .._checks import (
+    SHARE,
     Interval,
     file_name,
     flag,
@@ -18,6 +19,7 @@ from .feedback import SPEED_FILTER, AttitudeFilter, BalanceSpec, LegAngleRegulat
 from .learning import (
     FLIGHT_LAW,
     CurrentIterationILC,
+    LearningGuard,
     LearningLaw,
     NormOptimalILC,
     PaperILC,
@@ -42,6 +44,11 @@ class ControllerSpec:
         identified_gaits: Play gaits that were optimised again with the identified model.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
+        coupling: Share of the stance's errors that the flight's law is shown beyond its end; 0 to
+            1. Those early in stance are corrected three times, by the law of the stance, by that of
+            the flight, which looks ahead, and by the timing; with all of them shown (1) the three
+            make an oscillation that grows where motors are late.
+        guard: Guard of the learning, which goes back where errors grow; None lets them.
         timing: Adaptation of the flight's duration to the measured one; None plays it as planned.
             Without a law, and where no duration is given, it adapts from the first stride on.
         gains: Feedback gains: eq. (9).
@@ -62,6 +69,8 @@ class ControllerSpec:
     identified_gaits: bool = False
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
+    coupling: float = 1.0
+    guard: LearningGuard | None = None
     timing: FlightTiming | None = None
     gains: Gains = field(default_factory=Gains)
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
@@ -83,6 +92,8 @@ class ControllerSpec:
             known_law(prefix + name, getattr(self, name))
         if self.timing is not None:
             instance_of(f"{prefix}timing", self.timing, FlightTiming, "a FlightTiming, or None")
+        if self.guard is not None:
+            instance_of(f"{prefix}guard", self.guard, LearningGuard, "a LearningGuard, or None")
         keep_instances(
             self,
             prefix,
@@ -93,7 +104,7 @@ class ControllerSpec:
             contact=ContactDetector,
             attitude_filter=AttitudeFilter,
         )
-        keep_reals(self, {"speed_filter": SPEED_FILTER}, prefix)
+        keep_reals(self, {"speed_filter": SPEED_FILTER, "coupling": SHARE}, prefix)
         # Contacts are sensed a tick late.
         whole(f"{prefix}touchdown_ticks", self.touchdown_ticks, Interval(1, 50))
 
@@ -103,7 +114,14 @@ class ControllerSpec:
         return self.law, self.flight_law
 
 
-_ILC = ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming())
+_ILC = ControllerSpec(
+    "ilc",
+    law=PDTypeILC(),
+    flight_law=FLIGHT_LAW,
+    timing=FlightTiming(),
+    coupling=0.6,
+    guard=LearningGuard(),
+)
 """Learning from nothing, over the whole stride."""
 
 CONTROLLERS = {

@@ -142,19 +142,25 @@ class StrideRecord:
             robot=np.arange(n),
         )
 
-    def onward(self, following: StrideRecord, ratio: Array) -> StrideRecord:
+    def onward(self, following: StrideRecord, ratio: Array, share: float = 1.0) -> StrideRecord:
         """The record continued beyond s = 1 by another part of the stride.
+
+        `e(1 + ds) = (1 - share) e(1) + share e_following(ratio ds)`
 
         Args:
             following: That part, of the same robots.
             ratio: Duration of this part over that of the other, shape (n,).
+            share: Share of it that is believed; with 0 the last value is held.
         """
         beyond = (1.0 + np.arange(ONWARD)) * ratio[:, None]
-        return replace(
-            self,
-            error_onward=resample(following.error, beyond),
-            rate_onward=resample(following.error_rate, beyond),
+        error, rate = (
+            (1.0 - share) * held(own) + share * resample(other, beyond)
+            for own, other in (
+                (self.error, following.error),
+                (self.error_rate, following.error_rate),
+            )
         )
+        return replace(self, error_onward=error, rate_onward=rate)
 
     def less(self, error: Array, error_rate: Array, feedback: Array) -> StrideRecord:
         """The record less some errors and rates, and the feedback to them.
