@@ -269,14 +269,13 @@ class Controller:
         ticks = slice(min(reference.position.shape[1], log.joints.shape[1]))
         error = reference.position[rows, ticks] - log.joints[:, ticks]
         rate = reference.velocity[rows, ticks] - log.joint_rates[:, ticks]
-        error, rate, early = resample(error, index), resample(rate, index), error[:, : log.sensed]
+        error, rate = resample(error, index), resample(rate, index)
         return StrideRecord(
             error=error,
             error_rate=rate,
             feedback=resample(log.feedback, index),
             feedforward=self.feedforward[rows, part],
             missing=resample(log.missing, index),
-            contact_error=np.abs(early).max(axis=1, initial=0.0),
             error_onward=held(error),
             rate_onward=held(rate),
             relative_duration=np.full(len(rows), np.nan),

@@ -72,9 +72,10 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
 
     Per joint (mean over the legs and the steady strides):
         peak_error: Peak of the stance error against the unmodified reference [rad],
-            `mean_k max_s |e_k(s)|`.
-        rms_error: Its root mean square [rad], `sqrt(mean_k mean_s e_k(s)^2)`.
-        contact_error: The peak counted from the contact on, two ticks before it is felt [rad].
+            `mean_k max_t |e_k(t)|`, from the true contact on, whatever the controller felt.
+        rms_error: Its root mean square [rad], `sqrt(mean_k mean_t e_k(t)^2)`.
+        felt_peak_error: The peak from when the controller felt the contact on, and against its
+            own count of time [rad].
         strides_to_converge: See `strides_to_converge`; thigh and calf, and `-` for the later one.
         strides_to_beat_model: See `compare.metrics.time_to_beat`; added where the model was run
         too.
@@ -95,11 +96,11 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
         strides = strides.reindex(stride=[0])  # of nobody
     settings = {key: strides.attrs[key] for key in ("robot", "base", "scenario", "controller")}
     settings["seed"] = int(strides.attrs["seed"])
-    joints = by_joint(strides[["peak_error", "contact_error"]].to_dataarray("name"))
+    joints = by_joint(strides[["peak_error", "felt_peak_error"]].to_dataarray("name"))
     squares = by_joint(strides["rms_error"] ** 2)
     per_joint = {
         "peak_error": _array(joints.sel(name="peak_error"), "joint"),
-        "contact_error": _array(joints.sel(name="contact_error"), "joint"),
+        "felt_peak_error": _array(joints.sel(name="felt_peak_error"), "joint"),
         "rms_error": _array(squares, "joint"),
     }
     scalars = {
@@ -151,7 +152,7 @@ def _errors(end: Mapping[str, Array]) -> Iterator[_Row]:
     for j, joint in enumerate(JOINTS):
         yield joint, "peak_error", float(end["peak_error"][:, j].mean()), "rad"
         yield joint, "rms_error", float(np.sqrt(end["rms_error"][:, j].mean())), "rad"
-        yield joint, "contact_error", float(end["contact_error"][:, j].mean()), "rad"
+        yield joint, "felt_peak_error", float(end["felt_peak_error"][:, j].mean()), "rad"
 
 
 def _motion(end: Mapping[str, Array], planned: Mapping[str, float]) -> Iterator[_Row]:

@@ -109,7 +109,7 @@ def _of_the_metrics(summary: pd.DataFrame) -> Iterator[str]:
     shown = {
         name
         for name in summary["controller"].unique()
-        if all(np.isfinite(mean("contact_error", name, joint)) for joint in SHOWN)
+        if all(np.isfinite(mean("felt_peak_error", name, joint)) for joint in SHOWN)
     }
     yield (
         "Peaks are against the unmodified reference, means over the legs and the last 30 strides; "
@@ -119,12 +119,14 @@ def _of_the_metrics(summary: pd.DataFrame) -> Iterator[str]:
     if later:
         numbers = "; ".join(
             f"{name} "
-            + ", ".join(f"{mean('contact_error', name, joint):.4f} rad {joint}" for joint in SHOWN)
+            + ", ".join(
+                f"{mean('felt_peak_error', name, joint):.4f} rad {joint}" for joint in SHOWN
+            )
             for name in later
         )
         yield (
-            "Errors count from when the touchdown is felt, as the controller sees it. Counted from "
-            f"the contact itself, one to two ticks earlier, the mean peaks are: {numbers}."
+            "Errors count from the true contact on, which no controller knows. Counted from when "
+            f"it is felt, as a controller sees it, the mean peaks are: {numbers}."
         )
     if "pd" in shown:
         printed = table_1()

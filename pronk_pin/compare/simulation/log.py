@@ -22,6 +22,7 @@ from ...control import (
 from ...gait import Gait
 from ...robot import NL, rotation_matrix
 from ..world import Motion
+from .contact_errors import ContactErrors
 from .quantities import EVERY, LAST, SAMPLES, STRIDE_QUANTITIES, TICK_QUANTITIES
 
 SHORTEST_STRIDE = 0.5
@@ -169,6 +170,7 @@ class StrideLog:
         self._timestep = timestep
         self._grid = phase_grid(SAMPLES)
         self._begin_x = np.zeros(n)
+        self._contact = ContactErrors(gaits, timestep)
         self.count = np.zeros(n, dtype=np.intp)
         # Ticks are kept in turn, and only near the end of the simulation.
         self._near = (LAST + 1) * LONGEST_PART * whole
@@ -192,10 +194,10 @@ class StrideLog:
     def stance(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
         """Log a stance of so many ticks (m,)."""
         at = (rows, self.count[rows])
-        peak = np.abs(record.error).max(axis=1)
-        self["peak_error"][at] = peak
-        self["rms_error"][at] = np.sqrt(np.mean(record.error**2, axis=1))
-        self["contact_error"][at] = np.maximum(peak, record.contact_error)
+        self["peak_error"][at], self["rms_error"][at] = self._contact.stance(
+            rows, log.joints, log.force, length
+        )
+        self["felt_peak_error"][at] = np.abs(record.error).max(axis=1)
         self["stance"][at] = length * self._timestep
         self._begin_x[rows] = log.base[rows, 0, 0]
         self._keep(0, rows, record, log, length)
@@ -206,6 +208,7 @@ class StrideLog:
         height = log.base[_compact(rows), : len(ticks), 1]
         highest = np.where(ticks < length[:, None], height, -np.inf).max(axis=1)
         self["apex"][rows, self.count[rows]] = highest
+        self._contact.flight(rows, log.joints, log.force, length)
         self._keep(1, rows, record, log, length)
 
     def _keep(

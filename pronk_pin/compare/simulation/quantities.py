@@ -111,14 +111,17 @@ STRIDE_QUANTITIES = (
     Quantity("tilt", _STRIDE, "rad", "largest angle between the trunk and the gait's"),
     Quantity("flight_reference", _STRIDE, "s", "how long the reference of the flight lasted"),
     Quantity(
-        "peak_error", _JOINT, "rad", "peak of the stance error against the unmodified reference"
-    ),
-    Quantity("rms_error", _JOINT, "rad", "root mean square of the stance error"),
-    Quantity(
-        "contact_error",
+        "peak_error",
         _JOINT,
         "rad",
-        "peak of the stance error from the contact on, before it was felt",
+        "peak of the stance error from the true contact on, against the unmodified reference",
+    ),
+    Quantity("rms_error", _JOINT, "rad", "root mean square of the stance error from there on"),
+    Quantity(
+        "felt_peak_error",
+        _JOINT,
+        "rad",
+        "peak of the stance error from when the controller felt the contact, as it counts",
     ),
     Quantity("error", (*_CURVE, "joint"), "rad", "reference minus measured joint angle"),
     Quantity("feedback", (*_CURVE, "joint"), "N m", "torque of the feedback"),

@@ -6,19 +6,21 @@ A stance ends by time, as its reference does; a flight ends with the touchdown t
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeAlias
 
 import numpy as np
+import xarray as xr
 
 from ..._checks import Interval, flag, instance_of, known_name, whole
 from ..._typing import Array, IntArray
-from ...control import Controller, ControllerSpec
+from ...control import Controller, ControllerSpec, InitialFeedforward
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
 from ...robot import BASES, Robot
 from ..world import Scenario, without_warnings
+from .dataset import to_dataset
 from .log import StrideLog
 from .memory import check_memory
 from .player import Player
@@ -190,3 +192,49 @@ class Simulation:
 
     def _seconds(self, ticks: IntArray) -> Array:
         return np.asarray(ticks * self._dt, dtype=float)
+
+
+def simulate(
+    robot: Robot,
+    gaits: Sequence[Gait],
+    spec: ControllerSpec,
+    scenario: Scenario,
+    *,
+    schedule: Schedule,
+    rng: np.random.Generator,
+    initial: InitialFeedforward | None = None,
+    base: str = "locked",
+    attributes: Mapping[str, str | int | float] | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Simulate robots under one controller in one scenario, and label their strides.
+
+    Args:
+        robot: The robot.
+        gaits: The gait of each robot.
+        spec: The controller.
+        scenario: The scenario.
+        schedule: What happens when.
+        rng: Source of the scatter at the start, and of the sensors' noise.
+        initial: Torques that the controller begins with; by default none.
+        base: How the trunks may move: "locked" to x and z, "sagittal" with pitch, or "free".
+        attributes: Attributes of the dataset; by default the name of the robot.
+        progress: Called with the number of time steps done since the last call.
+
+    Returns:
+        The strides, see `to_dataset`.
+    """
+    initial = InitialFeedforward() if initial is None else initial
+    simulation = Simulation(
+        robot,
+        gaits,
+        spec,
+        scenario,
+        schedule=schedule,
+        rng=rng,
+        feedforward=initial.feedforward,
+        flight=initial.flight,
+        base=base,
+    )
+    attributes = {"robot": robot.name} if attributes is None else attributes
+    return to_dataset(simulation.run(progress), robot, gaits, attributes=attributes)

@@ -25,7 +25,7 @@ _LEG = "FL"
 
 VARIABLES = (
     *("count", "start", "learning", "planned_duration", "error"),
-    *("peak_error", "rms_error", "contact_error", "upright"),
+    *("peak_error", "rms_error", "felt_peak_error", "upright"),
 )
 """Variables of the strides that the readings take."""
 
@@ -55,7 +55,7 @@ READINGS: dict[str, Callable[[xr.Dataset], xr.DataArray]] = {
     "peak of the mean stride": lambda end: by_joint(abs(end["error"].mean("stride")).max("phase")),
     "peak after the first 50 ms": lambda end: _legs(abs(_late(end)).max("phase")),
     "error in the middle of stance": lambda end: _legs(_middle(end)),
-    "peak from the contact on": lambda end: _legs(end["contact_error"]),
+    "peak from when it is felt": lambda end: _legs(end["felt_peak_error"]),
     "RMS": lambda end: _legs(end["rms_error"]),
     "mean magnitude": lambda end: _legs(abs(end["error"]).mean("phase")),
 }

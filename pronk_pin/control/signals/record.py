@@ -84,7 +84,6 @@ class StrideRecord:
         missing: Torque that the motors' limits cut off: delivered minus commanded [N m].
         relative_duration: Duration of the stride over the reference's, shape (n,); NaN as long as
             the stride goes on.
-        contact_error: Largest error between the contact and its detection [rad], shape (n, 12).
         error_onward: The error beyond s = 1, shape (n, ONWARD, 12): the last one, where nothing
             else was put there by `onward`.
         rate_onward: The error's time derivative likewise.
@@ -98,7 +97,6 @@ class StrideRecord:
     feedforward: Array
     missing: Array
     relative_duration: Array
-    contact_error: Array
     error_onward: Array
     rate_onward: Array
     upright: BoolArray
@@ -115,7 +113,6 @@ class StrideRecord:
             feedforward=np.full(curve, np.nan),
             missing=np.full(curve, np.nan),
             relative_duration=np.full(n, np.nan),
-            contact_error=np.full((n, NL), np.nan),
             error_onward=np.full(onward, np.nan),
             rate_onward=np.full(onward, np.nan),
             upright=np.ones(n, dtype=bool),
@@ -127,7 +124,7 @@ class StrideRecord:
         cls, error: Array, error_rate: Array, feedback: Array, feedforward: Array
     ) -> StrideRecord:
         """Make the record of regular strides from arrays (n, samples, joints)."""
-        n, _, joints = error.shape
+        n = len(error)
         return cls(
             error=error,
             error_rate=error_rate,
@@ -135,7 +132,6 @@ class StrideRecord:
             feedforward=feedforward,
             missing=np.zeros_like(error),
             relative_duration=np.ones(n),
-            contact_error=np.zeros((n, joints)),
             error_onward=held(error),
             rate_onward=held(error_rate),
             upright=np.ones(n, dtype=bool),
@@ -197,7 +193,6 @@ class StrideRecord:
             feedforward=self.feedforward[rows],
             missing=self.missing[rows],
             relative_duration=self.relative_duration[rows],
-            contact_error=self.contact_error[rows],
             error_onward=self.error_onward[rows],
             rate_onward=self.rate_onward[rows],
             upright=self.upright[rows],
@@ -212,7 +207,6 @@ class StrideRecord:
         self.feedforward[rows] = other.feedforward
         self.missing[rows] = other.missing
         self.relative_duration[rows] = other.relative_duration
-        self.contact_error[rows] = other.contact_error
         self.error_onward[rows] = other.error_onward
         self.rate_onward[rows] = other.rate_onward
         self.upright[rows] = other.upright

@@ -44,7 +44,7 @@ def made() -> Callable[..., xr.Dataset]:
                 "planned_apex": ("speed", [0.34]),
                 "peak_error": ((*stride, "joint"), errors),
                 "rms_error": ((*stride, "joint"), 0.1 * errors),
-                "contact_error": ((*stride, "joint"), 1.5 * errors),
+                "felt_peak_error": ((*stride, "joint"), 1.5 * errors),
                 "upright": (stride, scalars),
                 "learning": (stride, learning[None].astype(float)),
                 "mean_speed": (stride, 0.25 * scalars),
