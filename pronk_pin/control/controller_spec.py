@@ -139,7 +139,12 @@ CONTROLLERS = {
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
         ControllerSpec("identified", source="identified"),
         ControllerSpec("identified+gait", source="identified", identified_gaits=True),
-        ControllerSpec("ilc-zero", law=PDTypeILC(gain=0.0), flight_law=PDTypeILC(gain=0.0)),
+        replace(
+            _ILC,
+            name="ilc-zero",
+            law=replace(PDTypeILC(), gain=0.0),
+            flight_law=replace(FLIGHT_LAW, gain=0.0),
+        ),
         replace(_ILC, name="ilc-imu", imu=True),
         ControllerSpec("model+timing", source="model", timing=FlightTiming()),
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),

@@ -66,13 +66,28 @@ PEAKS = {"pd": (0.10, 0.05), "ilc": (0.02, 0.01), "model": (0.03, 0.005)}
 @pytest.fixture
 def summary() -> pd.DataFrame:
     """Two speeds, of which the paper has one; errors twice as large at the other."""
+    return made_summary({0.3: 1.0, 0.35: 2.0})
+
+
+@pytest.fixture
+def eight() -> pd.DataFrame:
+    """Eight speeds, enough for intervals; errors twice as large at every other one."""
+    return made_summary({0.3 + 0.05 * k: 1.0 + k % 2 for k in range(8)})
+
+
+def made_summary(scales: dict[float, float]) -> pd.DataFrame:
+    """A summary of three controllers at speeds whose errors are so many times `PEAKS`."""
     rows: list[dict[str, object]] = []
     for controller, peaks in PEAKS.items():
-        for speed, scale in ((0.3, 1.0), (0.35, 2.0)):
+        for speed, scale in scales.items():
             key = {"robot": "a1", "base": "locked", "scenario": "nominal", "speed": speed}
             key |= {"controller": controller, "seed": 0}
             for joint, peak in zip(("calf", "thigh"), peaks, strict=True):
-                for metric, share in (("peak_error", 1.0), ("rms_error", 0.1)):
+                for metric, share in (
+                    ("peak_error", 1.0),
+                    ("felt_peak_error", 0.5),
+                    ("rms_error", 0.1),
+                ):
                     value = scale * share * peak
                     rows.append({**key, "joint": joint, "metric": metric, "value": value})
             scalars = {"upright": 1.0, "feedback_share": 0.2, "speed_error": 0.1 * (scale - 1.5)}

@@ -10,13 +10,18 @@ import pandas as pd
 import xarray as xr
 
 from ..._checks import instance_of, known_name
-from ..._typing import Array, BoolArray
+from ..._typing import Array, BoolArray, IntArray
 from ...control import SKIPPED
 from ...robot import JOINTS
 from .effort import effort
 
 STEADY_STRIDES = 30
-"""Strides at the end of a simulation that count as steady state (paper, section III.B)."""
+"""Strides at the end of a simulation that count as steady state (paper, section III.B), if there
+are as many after the transient."""
+
+TRANSIENT = 10
+"""First strides of learning that are a transient, and no steady state; of a short learning the
+first half."""
 
 SETTLED = 0.1
 """Learning has settled where this share of the improvement, or less, is still missing."""
@@ -34,17 +39,22 @@ def steady(strides: xr.Dataset) -> xr.Dataset:
     """Select the last `STEADY_STRIDES` finished strides of each speed, renumbered from 0.
 
     None from before the learning was switched on, or would have been for a controller that does
-    not learn, so that all are judged on the same strides: fewer, then, after a short learning. A
-    robot that finished none has NaN in all of them.
+    not learn, so that all are judged on the same strides, and none of its `TRANSIENT`: fewer, then,
+    after a short learning. A robot that finished none has NaN in all of them.
     """
     instance_of("strides", strides, xr.Dataset, "strides, as Results.strides() returns them")
     count = strides["count"].to_numpy()
-    learned = _switched(strides).sum(axis=1)
-    made = np.where(learned > 0, learned, count)[count > 0]
-    last = min(STEADY_STRIDES, int(made.min())) if made.size else 0
+    last = int(_steady_count(count, _switched(strides).sum(axis=1))[count > 0].min(initial=2**31))
+    last = last if count.any() else 0
     offset = xr.DataArray(np.arange(last), dims="stride")
     start = xr.DataArray(count - last, dims="speed", coords={"speed": strides["speed"]})
     return strides.isel(stride=start + offset)
+
+
+def _steady_count(count: IntArray | int, learned: IntArray | int) -> IntArray:
+    """How many strides at the end are steady state, of so many, of them so many of learning."""
+    settled = np.maximum(learned - TRANSIENT, (learned + 1) // 2)
+    return np.minimum(STEADY_STRIDES, np.where(learned > 0, settled, count))
 
 
 def _switched(strides: xr.Dataset) -> BoolArray:
@@ -115,7 +125,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
     for k, speed in enumerate(strides["speed"].to_numpy()):
         count = int(strides["count"][k])
         learning = scalars["learning"][k, :count] == 1
-        last = min(STEADY_STRIDES, int(switched[k, :count].sum()) or count)
+        last = int(_steady_count(count, switched[k, :count].sum()))
         last_strides = slice(count - last, max(count, 1))  # without any, one of NaN
         planned = {"mean_speed": speed, "apex": float(strides["planned_apex"][k])}
         metrics = [

@@ -10,7 +10,7 @@ from scipy import stats
 
 from ...errors import InvalidInput
 from ..experiment import Results
-from ..metrics import Interval, compare_pairs, family, robots
+from ..metrics import LEAST_UNITS, Interval, compare_pairs, family, robots
 from .tables import SHOWN
 from .verdict import between, number
 
@@ -27,8 +27,9 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     Robots are matched by world, controller, speed and, if both have the same ones, seed; otherwise
     each speed's mean over its seeds. The p-values are those of the paired permutation test (signs
     of the differences flipped), adjusted for the number of rows by Benjamini and Hochberg, so that
-    at most `LEVEL` of the changes named are false alarms. A fall for which there was none counts
-    too, whatever the errors do.
+    at most `LEVEL` of the changes named are false alarms. Fewer than `LEAST_UNITS` pairs are not
+    tested: the smallest p of n pairs is 2 / 2^n. A fall for which there was none counts too,
+    whatever the errors do.
 
     Returns:
         A row each scenario, controller and joint: `before`, `after` [rad], `difference` and its
@@ -70,24 +71,42 @@ def format_changes(first: Results, second: Results) -> str:
     table = changes(before, after)
     lines = [f"before  {first.folder}", f"after   {second.folder}"]
     lines += _differences(first, second)
-    named = table[table["change"] != ""]
     lines.append("")
-    if len(named):
-        lines += [
-            f"{'scenario':>14} {'controller':>12} {'joint':>6}  {'before':>7} {'after':>7} "
-            f"{'difference':>10} {'95 % interval':>18}  {'p':>7}  change",
-            *(_line(key, row) for key, row in named.iterrows()),
-        ]
-    silent = int((table["robots"] == 0).sum() - (named["robots"] == 0).sum())
-    same = len(table) - len(named) - silent
-    identical = int(((table["difference"] == 0.0) & (table["p"].isna())).sum())
+    lines += [
+        f"{'scenario':>14} {'controller':>12} {'joint':>6}  {'before':>7} {'after':>7} "
+        f"{'difference':>10} {'95 % interval':>18} {'pairs':>5}  {'p':>7}  change",
+        *(_line(key, row) for key, row in table.iterrows()),
+    ]
+    named = table["change"] != ""
+    silent = ~named & (table["robots"] == 0)
+    identical = ~named & ~silent & (table["difference"] == 0.0)
+    few = ~named & ~silent & ~identical & (table["robots"] < LEAST_UNITS)
+    same = ~named & ~silent & ~identical & ~few
     lines.append(
-        f"{len(named)} of {len(table)} mean peak errors changed beyond noise (at most {LEVEL:.0%} "
-        f"of those named are false alarms); {same} did not"
-        + (f", {identical} of them are the same to the bit." if identical else ".")
-        + (f" Of {silent} nothing is concluded: no robot stayed up in both." if silent else "")
+        f"{named.sum()} of {len(table)} mean peak errors changed beyond noise (at most {LEVEL:.0%} "
+        f"of those named are false alarms)."
+        + (f" Of {same.sum()} no change is shown." if same.any() else "")
+        + (f" {identical.sum()} are the same to the bit." if identical.any() else "")
+        + (
+            f" Of {few.sum()} nothing can be told: {_counted(table['robots'][few])}, and it takes "
+            f"{LEAST_UNITS}; compare results with more speeds, seeds or sampled scenarios."
+            if few.any()
+            else ""
+        )
+        + (
+            f" Of {silent.sum()} nothing is concluded: no robot stayed up in both."
+            if silent.any()
+            else ""
+        )
     )
     return "\n".join(lines)
+
+
+def _counted(pairs: pd.Series) -> str:
+    """How many pairs there are in the rows: "4 pairs", "2 to 4 pairs"."""
+    least, most = int(pairs.min()), int(pairs.max())
+    number_of = f"{most}" if least == most else f"{least} to {most}"
+    return f"{number_of} pair" + ("s" if most != 1 else "")
 
 
 def _cells(summary: pd.DataFrame) -> list[tuple[str, str]]:
@@ -123,8 +142,8 @@ def _row(
 
 
 def _sign_flips(pairs: np.ndarray[Any, Any]) -> float:
-    """p-value of a mean difference of 0; NaN where there is nothing to test."""
-    if pairs.size < 2 or not pairs.any():
+    """p-value of a mean difference of 0; NaN where there is nothing to test, or too little."""
+    if pairs.size < LEAST_UNITS or not pairs.any():
         return float("nan")
     done = stats.permutation_test(
         (pairs,),
@@ -168,5 +187,5 @@ def _line(key: Any, row: pd.Series) -> str:
     return (
         f"{world:>14} {controller:>12} {joint:>6}  {number(row['before'], '.4f'):>7} "
         f"{number(row['after'], '.4f'):>7} {number(row['difference'], '+.4f'):>10} "
-        f"{interval:>18}  {number(row['p'], '.1g'):>7}  {row['change']}{falls}"
+        f"{interval:>18} {row['robots']:>5d}  {number(row['p'], '.1g'):>7}  {row['change']}{falls}"
     )

@@ -73,9 +73,14 @@ def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
     if units == {"speed"} and len(results.experiment.speeds) > 1:
         count = "One seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
         yield (
-            f"{count}: fewer than {LEAST_UNITS} are no sample, so intervals are drawn over the "
-            f"{len(results.experiment.speeds)} speeds. They say how the mean would scatter over "
-            "speeds and starting postures like these, not over other scenarios."
+            f"{count}: fewer than {LEAST_UNITS} are no sample, so intervals are over the "
+            f"{len(results.experiment.speeds)} speeds, which are chosen and not drawn"
+            + (
+                ". They say how the mean would scatter over speeds and starting postures like "
+                "these, not over other scenarios."
+                if len(results.experiment.speeds) >= LEAST_UNITS
+                else f"; and there are none, since fewer than {LEAST_UNITS} make no interval."
+            )
         )
     if any(map(sampled, scenarios)):
         yield (

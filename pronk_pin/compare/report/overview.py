@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -25,8 +25,8 @@ from ..metrics import (
 )
 from .tables import SHOWN
 
-_MOVING = 0.05
-"""Speed from which on a robot goes somewhere, so that its transport has a cost [m/s]."""
+MOVING = 0.1
+"""Measured speed from which on a robot goes somewhere, so that its transport has a cost [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class JointOverview:
     """Errors of one joint under a controller, means over the robots that did not fall.
 
     Attributes:
-        peak: Mean peak error [rad].
+        peak: Mean peak error from the true contact on [rad].
+        felt: The same from when the controller felt it [rad].
         rms: Mean root mean square error [rad].
         reduction: Of the mean peak against PD's; NaN where that was not run.
         difference: Of the mean peak from the model's, pair by pair [rad]; likewise.
@@ -45,6 +46,7 @@ class JointOverview:
     """
 
     peak: Interval
+    felt: float
     rms: float
     reduction: Interval = NO_INTERVAL
     difference: Interval = NO_INTERVAL
@@ -74,7 +76,9 @@ class ControllerOverview:
         taught: Strides that something was learned from; None without learning.
         beat: When it came to beat the model.
         feedback: The feedback's share of the torque.
+        power: Mean mechanical power [W].
         cost: Mean cost of transport of the robots that move.
+        moving: How many those are: at 0.1 m/s or more, as measured.
         speed_error: Mean magnitude [m/s].
         apex_error: Mean magnitude [m].
         upright: Robots that stayed up.
@@ -88,7 +92,9 @@ class ControllerOverview:
     taught: int | None
     beat: Beat
     feedback: float
+    power: float
     cost: float
+    moving: int
     speed_error: float
     apex_error: float
     upright: int
@@ -137,7 +143,8 @@ def _reached(
         return np.asarray(table(metric).to_numpy(dtype=float)).ravel()
 
     settled, cost = values("strides_to_converge"), table("cost_of_transport")
-    moving = np.abs(cost.columns.to_numpy(float)) > _MOVING
+    measured = table("speed_error").reindex_like(cost) + cost.columns.to_numpy(float)
+    costs = cost.where(np.abs(measured) >= MOVING).to_numpy(dtype=float)
     learned = lessons(summary, controller=controller)
     upright = own[own["metric"] == "upright"]["value"]
     return ControllerOverview(
@@ -146,7 +153,9 @@ def _reached(
         taught=None if learned is None else learned.taught,
         beat=Beat(*beaten(summary, controller=controller)),
         feedback=_mean(values("feedback_share")),
-        cost=_mean(cost.loc[:, moving].to_numpy(float)),
+        power=_mean(values("power")),
+        cost=_mean(costs),
+        moving=int(np.isfinite(costs).sum()),
         speed_error=_mean(np.abs(values("speed_error"))),
         apex_error=_mean(np.abs(values("apex_error"))),
         upright=int((upright == 1.0).sum()),
@@ -159,30 +168,31 @@ def _reached(
 def _joint(
     summary: pd.DataFrame, scenario: str, controller: str, joint: str, rivals: set[str]
 ) -> JointOverview:
-    errors, rms = (
-        robots(summary, scenario=scenario, controller=controller, metric=metric, joint=joint)
-        for metric in ("peak_error", "rms_error")
+    def errors(metric: str) -> pd.DataFrame:
+        return robots(summary, scenario=scenario, controller=controller, metric=metric, joint=joint)
+
+    own = JointOverview(
+        peak=mean_interval(errors("peak_error")),
+        felt=_mean(errors("felt_peak_error").to_numpy(dtype=float)),
+        rms=_mean(errors("rms_error").to_numpy(dtype=float)),
     )
-    peak, rms_mean = mean_interval(errors), _mean(np.asarray(rms.to_numpy(dtype=float)).ravel())
-    reduction = NO_INTERVAL
     if "pd" in rivals:
-        reduction = compare_controllers(
+        beside_pd = compare_controllers(
             summary, scenario=scenario, controller=controller, against="pd", joint=joint
-        ).reduction
-    if RIVAL not in rivals:
-        return JointOverview(peak, rms_mean, reduction)
-    beside = compare_controllers(
-        summary, scenario=scenario, controller=controller, against=RIVAL, joint=joint
-    )
-    return JointOverview(
-        peak,
-        rms_mean,
-        reduction,
-        difference=beside.difference,
-        wins=beside.improvement,
-        better=beside.better,
-        pairs=beside.pairs,
-    )
+        )
+        own = replace(own, reduction=beside_pd.reduction)
+    if RIVAL in rivals:
+        beside = compare_controllers(
+            summary, scenario=scenario, controller=controller, against=RIVAL, joint=joint
+        )
+        own = replace(
+            own,
+            difference=beside.difference,
+            wins=beside.improvement,
+            better=beside.better,
+            pairs=beside.pairs,
+        )
+    return own
 
 
 def _mean(values: Array) -> float:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from ..metrics import CONFIDENCE, LEARNER, Interval, control_arm, family, in_family
 from .inconclusive import inconclusive, unsaid
-from .overview import ControllerOverview, Overview, answer, overview
+from .overview import MOVING, ControllerOverview, Overview, answer, overview
 from .tables import SHOWN, beside_the_paper, sampled_scenarios, worst_reduction
 
 _WIDTH = 100
@@ -35,16 +35,21 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: Overview | None = No
     learning = table[LEARNER]
     if learning.unit == "scenario":
         return _sampled_verdict(summary, scenario, table)
+    less, speeds = _less(learning), in_family(summary, scenario)["speed"].nunique()
     worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
-    less = _less(learning)
     settled = (
         f", within {_count(int(learning.settled), 'stride')} at every speed."
         if np.isfinite(learning.settled)
         else "; at some speed it has not settled."
     )
     sentences = [
-        f"Learning cuts the mean peak error by {less} against PD ({worst['calf']:.0%} and "
-        f"{worst['thigh']:.0%} at the worst speed){settled}"
+        f"Learning cuts the mean peak error, from the contact on, by {less} against PD"
+        + (
+            f" ({worst['calf']:.0%} and {worst['thigh']:.0%} at the worst speed)"
+            if speeds > 1
+            else ""
+        )
+        + settled
     ]
     if reason := _no_rival(summary, scenario, table):
         sentences.append(reason)
@@ -135,7 +140,7 @@ def _against_the_model(learning: ControllerOverview, model: ControllerOverview) 
     beat = learning.beat
     if beat.robots:
         text += (
-            f" {beat.robots} of {beat.learners} robots beat it in both joints, "
+            f" Robot by robot, {beat.robots} of {beat.learners} come to beat it in both joints, "
             f"after {beat.strides:.0f} strides in the median."
         )
     return text
@@ -157,10 +162,10 @@ def _control_arm(summary: pd.DataFrame) -> str:
     if largest is None:
         return ""
     if largest == 0.0:
-        return "The control arm, learning with gain 0, shows nothing: every number is PD's."
+        return "The control arm, learning with gain 0, shows nothing: every peak error is PD's."
     return (
-        f"The control arm, learning with gain 0, differs from PD by up to {largest:.2g}: what "
-        "learning shows is not to be trusted beyond that."
+        "The control arm, which learns with gain 0 and times its flights, differs from PD by up to "
+        f"{largest:.2g} rad: what learning shows is not to be trusted beyond that."
     )
 
 
@@ -311,24 +316,31 @@ def _format_beside(table: pd.DataFrame) -> str:
 
 def format_overview(table: Overview) -> str:
     """An `overview` as text: peaks with their intervals, and against the model."""
+    wide = max(10, *map(len, table))
     lines = [
-        f"{'':>10}  {'calf: peak [rad]':^23} {'thigh: peak [rad]':^23}  beats model  strides to"
-        "  feedb.  cost of  stayed",
-        f"{'controller':>10}  {'mean':>6} {'95 % interval':>16} {'mean':>6} {'95 % interval':>16}  "
-        f"{'calf/thigh':>11}  {'beat it':>10}  {'share':>6}  {'transp.':>7}  upright",
+        f"{'':>{wide}}  {'calf: peak error [rad]':^27} {'thigh: peak error [rad]':^27}"
+        "  beats model  strides to  feedb.  cost of  stayed",
+        f"{'controller':>{wide}}  "
+        + f"{'mean':>6} {'95 % interval':>13} {'felt':>6} " * 2
+        + f" {'calf/thigh':>11}  {'beat it':>10}  {'share':>6}  {'transp.':>7}  upright",
     ]
     for name, row in table.items():
-        peaks = [row.joints[joint].peak for joint in SHOWN]
         cells = " ".join(
-            f"{number(peak.value, '.4f'):>6} {between(peak, '.4f'):>16}" for peak in peaks
+            f"{number(own.peak.value, '.4f'):>6} {between(own.peak, '.4f', '-'):>13} "
+            f"{number(own.felt, '.4f'):>6}"
+            for own in (row.joints[joint] for joint in SHOWN)
         )
         lines.append(
-            f"{name:>10}  {cells}  {against_model(row):>11}  {beat_text(row):>10}  "
+            f"{name:>{wide}}  {cells}  {against_model(row):>11}  {beat_text(row):>10}  "
             f"{number(row.feedback, '.0%'):>6}  {number(row.cost, '.2f'):>7}  "
             f"{row.upright} of {row.robots}"
         )
     if units := units_of_intervals(table):
-        lines.append(f"{'':>10}  intervals over the {units}")
+        lines.append(f"{'':>{wide}}  intervals over the {units}")
+    lines.append(
+        f"{'':>{wide}}  peaks from the true contact on; felt: from when the controller felt it; "
+        f"cost from {MOVING:g} m/s on"
+    )
     return "\n".join(lines)
 
 
@@ -360,11 +372,11 @@ def beat_text(row: ControllerOverview) -> str:
     return f"{beat.strides:.0f}{few}"
 
 
-def between(interval: Interval, form: str) -> str:
+def between(interval: Interval, form: str, word: str = " to ") -> str:
     """An interval, as "0.0210 to 0.0232"; a dash without one."""
     if not interval.known:
         return "-"
-    return f"{interval.low:{form}} to {interval.high:{form}}"
+    return f"{interval.low:{form}}{word}{interval.high:{form}}"
 
 
 def number(value: float, form: str) -> str:

@@ -19,6 +19,7 @@ from ...compare.metrics import (
     CONFIDENCE,
     LEARNER,
     LEAST_UNITS,
+    STEADY_STRIDES,
     VARIABLES,
     PeakHistory,
     family,
@@ -64,10 +65,13 @@ _CAPTIONS = {
 }
 
 _READING = (
-    "Errors are peaks of the joint angle's error in stance, means over legs, the last 30 strides "
-    f"and the robots that did not fall. Intervals hold {CONFIDENCE:.0%} (BCa bootstrap). The unit "
-    "that is drawn is the sampled scenario, or the seed in one that is not sampled, or the speed "
-    f"where there are fewer than {LEAST_UNITS} of them. A controller is better or worse than the "
+    "Errors are peaks of the joint angle's error in stance, from the true contact on, means over "
+    f"legs, the last strides (at most {STEADY_STRIDES}, none of the first of a short learning) and "
+    "the robots that did not fall; felt peaks are those from when the controller felt the contact. "
+    f"Intervals hold {CONFIDENCE:.0%} (t-intervals). The unit "
+    "is the sampled scenario, or the seed in one that is not sampled, or, where there are fewer "
+    f"than {LEAST_UNITS} of them, the speed, which is chosen and not drawn. Fewer than "
+    f"{LEAST_UNITS} of any have no interval. A controller is better or worse than the "
     "model where the interval of the paired difference excludes 0, else the matter is open. Wins, "
     "or the probability of improvement, are the share of the robots whose error is smaller than "
     "the same robot's with the model (Wilson interval). The model is beaten at the first stride "

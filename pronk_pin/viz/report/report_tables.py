@@ -116,12 +116,18 @@ def motion(table: Overview) -> pd.DataFrame:
     """What else is to be known of the controllers in a world."""
     rows = {}
     for name, row in table.items():
-        cells = {f"{joint}: RMS [rad]": number(row.joints[joint].rms, ".4f") for joint in SHOWN}
+        cells: dict[str, str] = {}
+        for joint in SHOWN:
+            cells[f"{joint}: felt peak [rad]"] = number(row.joints[joint].felt, ".4f")
+            cells[f"{joint}: RMS [rad]"] = number(row.joints[joint].rms, ".4f")
         cells["better than model (calf/thigh)"] = against_model(row)
         cells["strides to beat it"] = beat_text(row)
         cells["strides to converge"] = number(row.settled, ".0f")
         cells["feedback's share"] = number(row.feedback, ".0%")
-        cells["cost of transport"] = number(row.cost, ".2f")
+        cells["power [W]"] = number(row.power, ".0f")
+        cells["cost of transport (robots at 0.1 m/s or more)"] = (
+            f"{number(row.cost, '.2f')} ({row.moving})"
+        )
         cells["speed error [m/s]"] = number(row.speed_error, ".3f")
         cells["apex error [mm]"] = number(1e3 * row.apex_error, ".1f")
         cells["upright"] = f"{row.upright} of {row.robots}"

@@ -130,9 +130,10 @@ def test_the_steady_state_is_the_last_30_finished_strides(
 def test_the_steady_state_of_a_short_learning_holds_no_stride_of_practice(
     made: Callable[..., xr.Dataset],
 ) -> None:
-    end = steady(made(learned(8)))
-    assert end.sizes["stride"] == 8
-    assert np.all(end["learning"] == 1.0)
+    for strides, kept in ((8, 4), (16, 8), (25, 15), (40, 30), (60, 30)):
+        end = steady(made(learned(strides)))
+        assert end.sizes["stride"] == kept  # no transient: ten strides, or the half of them
+        assert np.all(end["learning"] == 1.0)
 
 
 def test_who_does_not_learn_is_judged_on_the_same_strides_as_who_does(
@@ -142,7 +143,7 @@ def test_who_does_not_learn_is_judged_on_the_same_strides_as_who_does(
         strides = made(learned(8), controller=controller)
         strides["start"] = (("speed", "stride"), 0.4 * np.arange(BASELINE + 8.0)[None])
         strides.attrs |= {"switch": 0.4 * BASELINE, "timestep": 0.001}
-        assert steady(strides).sizes["stride"] == 8
+        assert steady(strides).sizes["stride"] == 4
         strides.attrs["switch"] = 1000.0  # never
         assert steady(strides).sizes["stride"] == STEADY_STRIDES
 

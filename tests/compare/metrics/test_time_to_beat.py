@@ -120,5 +120,5 @@ def test_strides_are_read_as_they_are_stored() -> None:
     )
     found = peak_history(strides)
     np.testing.assert_allclose(found.learning[0], [[22, 12], [23, 13], [24, 14]])
-    np.testing.assert_allclose(found.level, [[23, 13]])
+    np.testing.assert_allclose(found.level, [[23.5, 13.5]])  # without the first, a transient
     assert found.upright.tolist() == [1.0]

@@ -178,12 +178,12 @@ def test_a_robot_without_a_finished_stride_neither_stands_nor_fell(summary: pd.D
     assert "No robot fell. One robot finished no stride." in " ".join(text.split())
 
 
-def test_a_world_of_the_fallen_does_not_spoil_the_others(summary: pd.DataFrame) -> None:
-    both = pd.concat([summary, let_fall(summary).assign(scenario="slope")], ignore_index=True)
+def test_a_world_of_the_fallen_does_not_spoil_the_others(eight: pd.DataFrame) -> None:
+    both = pd.concat([eight, let_fall(eight).assign(scenario="slope")], ignore_index=True)
     words = suite_verdict(both)
     assert "In the calf it is better in 1 of 1." in words
     assert "In slope nothing is concluded: no robot stayed up under learning and under the" in words
-    assert "less by 80% (80 to 80%) in nominal. " in words
+    assert "less by 80% in nominal. " in words
     check_words(format_suite(both))
 
 
@@ -199,11 +199,13 @@ def test_worlds_that_all_fell_tell_nothing_together(summary: pd.DataFrame) -> No
 
 
 def test_sampled_worlds_of_the_fallen_are_not_counted_as_lost(summary: pd.DataFrame) -> None:
-    worlds = [summary.assign(scenario=f"random-4-{k}") for k in range(6)]
+    worlds = [summary.assign(scenario=f"random-4-{k}") for k in range(9)]
+    for k, world in enumerate(worlds):
+        world.loc[world["metric"] == "peak_error", "value"] *= 1.0 + 0.01 * k
     worlds[2] = let_fall(worlds[2])
     some = pd.concat(worlds, ignore_index=True)
     words = verdict(some, scenario="random-4")
-    assert "it is less in 5 of 5 scenarios" in words
+    assert "it is less in 8 of 8 scenarios" in words
     assert "6 robots fell." in words
     check_words(format_tables(some, scenario="random-4"))
     nobody = pd.concat(map(let_fall, worlds), ignore_index=True)
