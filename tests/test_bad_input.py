@@ -32,6 +32,7 @@ from pronk_pin.compare import (
     random_scenarios,
     run_experiment,
 )
+from pronk_pin.compare.results import create_results
 from pronk_pin.compare.simulation import memory
 from pronk_pin.compare.studies.gain_reduction import sweep_gains
 from pronk_pin.compare.studies.prediction import simulate_learning
@@ -792,7 +793,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A results folder in which nothing was simulated yet."""
     folder = tmp_path_factory.mktemp("results") / "empty"
     both = experiment(controllers=("pd", "ilc"), scenarios=("nominal", "payload"))
-    return Results.create(both, folder).folder
+    return create_results(both, folder).folder
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,8 @@ from ..compare import (
     mjcf_parity,
     run_experiment,
 )
-from ..compare.experiment import check_demand, known_address, load_suite
+from ..compare.execution import check_demand, known_address
+from ..compare.experiment import load_suite
 from ..compare.identification import DRAWS, IMU_NOISE, check_learner
 from ..compare.report import families, format_changes, format_suite, format_tables
 from ..compare.studies import close_loop, format_loop, format_reproduction

@@ -28,7 +28,7 @@ from ...dynamics import Rotors
 from ...errors import InvalidInput
 from ...gait import load_library
 from ...robot import JOINTS, load_robot
-from ..experiment import Results
+from ..results import Results
 from ..simulation import Schedule, simulate
 from ..world import Scenario
 

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from ..experiment import Results
 from ..metrics import by_joint, mean_interval, robots, steady, table_1
 from ..report import SHOWN, number
+from ..results import Results
 
 _SETTLED = 0.05
 """Time after which the touchdown transient is over [s]."""

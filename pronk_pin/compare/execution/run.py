@@ -24,13 +24,20 @@ from ..._checks import instance_of, path, worker_count
 from ..._workers import count_steps
 from ...control import load_controller
 from ...errors import FileProblem, WorkerLost
+from ..experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
+from ..metrics import join_summaries, summarize_cell
+from ..results import (
+    Results,
+    check_completion,
+    create_results,
+    describe_run,
+    encode,
+    locked,
+    remove_if_empty,
+)
 from ..simulation import Progress
 from .demand import check_demand
 from .executors import WorkerPool, connect, known_address, processes
-from .experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
-from .provenance import describe_run
-from .results import Results
-from .strides_file import encode
 
 MAX_RETRIES = 3
 """So often the workers may be lost before the run gives up."""
@@ -85,13 +92,13 @@ def run_experiment(
     else:
         instance_of("executor", executor, Executor, "an Executor, or an address dask://HOST:PORT")
     fresh = not folder.exists()
-    results = Results.create(experiment, folder, resimulate=resimulate)
+    results = create_results(experiment, folder, resimulate=resimulate)
     try:
-        with results.locked():
+        with locked(results.folder):
             _complete(results, workers, executor, progress=progress, resimulate=resimulate)
     except BaseException:
         if fresh:
-            results.remove_if_empty()
+            remove_if_empty(results.folder)
         raise
     return results
 
@@ -107,10 +114,9 @@ def _complete(
     """Simulate what is missing, and summarize."""
     cells = _missing(results, resimulate=resimulate)
     if not cells and results.provenance["finished"]:
-        results.summarize()
+        _summarize(results)
         return  # who made the strides stays on record
-    results.check_versions()
-    results.check_foreign()
+    check_completion(results)
     with tqdm(
         total=sum(map(_robot_steps, cells)),
         desc=f"simulating {len(results.experiment.speeds)} robots x {len(cells)}",
@@ -125,8 +131,15 @@ def _complete(
         else:
             run.elsewhere(cells, _worker_pool(executor, min(workers, len(cells))))
     began = time.monotonic()
-    results.summarize()
+    _summarize(results)
     run.finish(summary=time.monotonic() - began)
+
+
+def _summarize(results: Results) -> None:
+    """Write the summary of the strides in the folder."""
+    results.write_summary(
+        join_summaries(summarize_cell(results.strides(cell)) for cell in results.experiment.cells())
+    )
 
 
 def _missing(results: Results, *, resimulate: bool) -> list[Cell]:
@@ -256,7 +269,7 @@ class _Run:
         self._write()
 
     def finish(self, *, summary: float) -> None:
-        """The run is complete; its summary took so long [s]."""
+        """The run is complete; to join its summary took so long [s]."""
         self._record["wall_time_s"] = round(time.monotonic() - self.began, 1)
         self._record["summary_s"] = round(summary, 2)
         self._write(finished=True)
