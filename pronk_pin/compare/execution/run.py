@@ -9,10 +9,11 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,7 +26,7 @@ from ..._workers import count_steps
 from ...control import load_controller
 from ...errors import FileProblem, WorkerLost
 from ..experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
-from ..metrics import join_summaries, summarize_cell
+from ..metrics import CellSummary, join_summaries, summarize_cell
 from ..results import (
     Results,
     check_completion,
@@ -114,7 +115,7 @@ def _complete(
     """Simulate what is missing, and summarize."""
     cells = _missing(results, resimulate=resimulate)
     if not cells and results.provenance["finished"]:
-        _summarize(results)
+        _summarize(results, {})
         return  # who made the strides stays on record
     check_completion(results)
     with tqdm(
@@ -131,14 +132,17 @@ def _complete(
         else:
             run.elsewhere(cells, _worker_pool(executor, min(workers, len(cells))))
     began = time.monotonic()
-    _summarize(results)
+    _summarize(results, run.summaries)
     run.finish(summary=time.monotonic() - began)
 
 
-def _summarize(results: Results) -> None:
-    """Write the summary of the strides in the folder."""
+def _summarize(results: Results, made: Mapping[Cell, CellSummary]) -> None:
+    """Write the summary; the strides of cells that this run has not made are read for it."""
     results.write_summary(
-        join_summaries(summarize_cell(results.strides(cell)) for cell in results.experiment.cells())
+        join_summaries(
+            made[cell] if cell in made else summarize_cell(results.strides(cell))
+            for cell in results.experiment.cells()
+        )
     )
 
 
@@ -176,10 +180,14 @@ class FinishedCell(NamedTuple):
 
     strides: bytes
     """Its file."""
+    summary: CellSummary
+    """What it gives to the summary."""
     simulation: float
     """How long the simulation took [s]."""
     encoding: float
     """How long it took to make the file of it [s]."""
+    summarizing: float
+    """How long its summary took [s]."""
 
 
 @dataclass
@@ -190,6 +198,8 @@ class _Run:
     bar: tqdm[Any]
     missing: set[Cell]
     began: float = field(default_factory=time.monotonic)
+    summaries: dict[Cell, CellSummary] = field(default_factory=dict)
+    """Of the cells that are finished."""
 
     def __post_init__(self) -> None:
         self._record = {**describe_run(), "executor": "one process", "cells": {}}
@@ -261,10 +271,12 @@ class _Run:
 
     def _save(self, cell: Cell, finished: FinishedCell) -> None:
         self.results.save(cell, finished.strides)
+        self.summaries[cell] = finished.summary
         self.missing.discard(cell)
         self._record["cells"][cell.name] = {
             "simulation_s": round(finished.simulation, 2),
             "encoding_s": round(finished.encoding, 2),
+            "summary_s": round(finished.summarizing, 2),
         }
         self._write()
 
@@ -291,7 +303,10 @@ def _make(cell: Cell, dependency: xr.Dataset | None, progress: Progress) -> Fini
         times.append(time.perf_counter())
         data = encode(strides)
         times.append(time.perf_counter())
-    return FinishedCell(data, times[1] - times[0], times[2] - times[1])
+        summary = summarize_cell(strides)
+        times.append(time.perf_counter())
+    simulation, encoding, summarizing = (after - before for before, after in pairwise(times))
+    return FinishedCell(data, summary, simulation, encoding, summarizing)
 
 
 def _work(cell: Cell, dependency: xr.Dataset | None) -> FinishedCell:
