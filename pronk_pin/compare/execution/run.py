@@ -30,10 +30,10 @@ from ..metrics import CellSummary, join_summaries, summarize_cell
 from ..results import (
     Results,
     check_completion,
-    create_results,
     describe_run,
     encode,
     locked,
+    make_folder,
     remove_if_empty,
 )
 from ..simulation import Progress
@@ -93,7 +93,8 @@ def run_experiment(
     else:
         instance_of("executor", executor, Executor, "an Executor, or an address dask://HOST:PORT")
     fresh = not folder.exists()
-    results = create_results(experiment, folder, resimulate=resimulate)
+    results = Results.of(experiment, folder)
+    make_folder(results, resimulate=resimulate)
     try:
         with locked(results.folder):
             _complete(results, workers, executor, progress=progress, resimulate=resimulate)

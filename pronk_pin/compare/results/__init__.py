@@ -4,7 +4,7 @@ Comes in: an `Experiment`, and the strides and the summary of its cells.
 Goes out: `Results` on disk, with where they are from.
 """
 
-from .creation import check_completion, create_results, default_folder, remove_if_empty
+from .folder import check_completion, default_folder, make_folder, remove_if_empty
 from .lock import locked
 from .provenance import describe_run
 from .results import Results
@@ -13,10 +13,10 @@ from .strides_file import encode
 __all__ = [
     "Results",
     "check_completion",
-    "create_results",
     "default_folder",
     "describe_run",
     "encode",
     "locked",
+    "make_folder",
     "remove_if_empty",
 ]

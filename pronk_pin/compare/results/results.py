@@ -28,6 +28,7 @@ from typing import Any
 import pandas as pd
 import xarray as xr
 
+from ..._checks import instance_of
 from ..._checks import path as known_path
 from ...errors import FileProblem, InvalidInput
 from ...storage import read_bytes, reading, sealed, write_file
@@ -70,6 +71,31 @@ class Results:
         """
         folder = known_path("folder", folder)
         return cls(folder, read_experiment(folder))
+
+    @classmethod
+    def of(cls, experiment: Experiment, folder: Path | str) -> Results:
+        """The results of an experiment, and of what its folder has already; nothing is written yet.
+
+        Controllers, scenarios, speeds and seeds that the folder does not have are added to those
+        that it has.
+
+        Raises:
+            FileProblem: It is damaged, or holds an experiment that differs in what cannot be added
+                to.
+        """
+        folder = known_path("folder", folder)
+        instance_of("experiment", experiment, Experiment)
+        if not (folder / CONFIG).exists():
+            return cls(folder, experiment)
+        stored = cls.load(folder)
+        try:
+            return cls(folder, stored.experiment.extended(experiment))
+        except InvalidInput as error:
+            raise FileProblem(
+                folder,
+                f"holds another experiment ({error})",
+                "leave these options out to go on with it, or choose another folder",
+            ) from error
 
     @property
     def manifest(self) -> Manifest:

@@ -28,7 +28,7 @@ from pronk_pin.compare import (
     summarize,
 )
 from pronk_pin.compare.metrics import KEYS, join_summaries, summarize_cell
-from pronk_pin.compare.results import check_completion, create_results, locked
+from pronk_pin.compare.results import check_completion, locked, make_folder
 from pronk_pin.compare.results.config_file import SCHEMA
 from pronk_pin.compare.results.provenance import describe_run, git_state
 from pronk_pin.compare.results.strides_file import encode
@@ -48,7 +48,7 @@ def message(call: Callable[[], Any], path: Path) -> str:
 
 def test_a_folder_gives_back_the_experiment_it_was_made_for(tmp_path: Path) -> None:
     experiment = Experiment(speeds=(0.1, 0.35), controllers=("pd",), seeds=(2, 5))
-    create_results(experiment, tmp_path / "new" / "run")
+    make_folder(Results.of(experiment, tmp_path / "new" / "run"))
     assert Results.load(tmp_path / "new" / "run").experiment == experiment
 
 
@@ -148,7 +148,8 @@ def test_a_cell_is_found_by_its_controller(comparison: Results) -> None:
 
 def test_the_same_experiment_is_taken_up_again(copy: Results) -> None:
     shutil.rmtree(copy.folder / "strides")
-    taken = create_results(copy.experiment, copy.folder)
+    taken = Results.of(copy.experiment, copy.folder)
+    make_folder(taken)
     assert not taken.has(taken.find(controller="pd"))
     assert (copy.folder / "strides").is_dir()
     assert taken.provenance["finished"] is True
@@ -156,7 +157,7 @@ def test_the_same_experiment_is_taken_up_again(copy: Results) -> None:
 
 def test_another_experiment_is_not_mixed_in(copy: Results) -> None:
     other = dataclasses.replace(copy.experiment, base="free", schedule=Schedule(scatter=0.0))
-    text = message(lambda: create_results(other, copy.folder), copy.folder)
+    text = message(lambda: Results.of(other, copy.folder), copy.folder)
     assert text == (
         "holds another experiment (base is 'locked' there, and 'free' here; schedule.baseline is "
         "4.0 there, and 20.0 here; schedule.learning is 6.0 there, and 20.0 here; schedule.scatter "
@@ -246,7 +247,7 @@ def test_a_summary_that_is_missing_damaged_or_cut_is_made_again_from_the_strides
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     folder = tmp_path / "file" / "results"
-    text = message(lambda: create_results(Experiment(), folder), folder)
+    text = message(lambda: make_folder(Results.of(Experiment(), folder)), folder)
     assert text == "cannot be written (Not a directory); choose a folder of yours with --folder"
 
 
@@ -397,7 +398,7 @@ def test_no_folder_is_made_where_one_may_not_write(tmp_path: Path) -> None:
     place = tmp_path / "closed"
     place.mkdir()
     with read_only(place):
-        text = message(lambda: create_results(Experiment(), place / "new"), place / "new")
+        text = message(lambda: make_folder(Results.of(Experiment(), place / "new")), place / "new")
     assert text == "cannot be written (Permission denied); choose a folder of yours with --folder"
     assert not list(place.iterdir())
 

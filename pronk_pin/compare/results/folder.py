@@ -7,12 +7,11 @@ import warnings
 from datetime import datetime
 from pathlib import Path
 
-from ..._checks import file_name, instance_of
-from ..._checks import path as known_path
-from ...errors import FileProblem, InvalidInput, OtherMachine, cannot_write
+from ..._checks import file_name
+from ...errors import FileProblem, OtherMachine, cannot_write
 from ...robot import load_robot
 from ...storage import read_text
-from ..experiment import Definition, Experiment, define, differences
+from ..experiment import Definition, define, differences
 from ..world import ForeignRobot, mjcf_sha256
 from .config_file import CONFIG, config_text, read_definition
 from .manifest import MANIFEST
@@ -31,55 +30,37 @@ def default_folder(name: str = "comparison") -> Path:
     return Path(DEFAULT_PARENT) / f"{datetime.now():%Y%m%d-%H%M%S}-{name}"
 
 
-def create_results(
-    experiment: Experiment, folder: Path | str, *, resimulate: bool = False
-) -> Results:
-    """Make a results folder, or take up one that is there, and extend it by what is new.
+def make_folder(results: Results, *, resimulate: bool = False) -> None:
+    """Make the folder of results that are to be completed, or take up one that is there.
 
     Args:
-        experiment: What to run. Controllers, scenarios, speeds and seeds that the folder does
-            not have yet are added to those that it has.
-        folder: The folder.
+        results: What is to be in it, by `Results.of`.
         resimulate: Let strides in the folder that are of something else be simulated again;
             otherwise they are refused.
 
     Raises:
-        FileProblem: It cannot be written, or holds an experiment that differs in what cannot be
-            added to; or the experiment's MJCF cannot be read.
+        FileProblem: It cannot be written, or what it holds was begun with something else; or the
+            experiment's MJCF cannot be read.
         InvalidInput: The MJCF is not of this robot.
     """
-    folder = known_path("folder", folder)
-    instance_of("experiment", experiment, Experiment)
-    stored = Results.load(folder) if (folder / CONFIG).exists() else None
-    if stored is not None:
-        experiment = _extended(stored, experiment)
-    results = Results(folder, experiment)
+    folder, experiment = results.folder, results.experiment
+    stored = (folder / CONFIG).exists()
     known = results.foreign if results.has_foreign else None
     definition = define(experiment, mjcf_sha256=known.sha256 if known else None)
     if not resimulate:
-        _check_strides(results) if stored is None else _check_definition(stored, definition)
+        _check_definition(folder, definition) if stored else _check_strides(results)
     foreign = None
     if experiment.mjcf and known is None:
         foreign = ForeignRobot.read(load_robot(experiment.robot), experiment.mjcf)
-    _make_folder(folder)
+    try:
+        (folder / "strides").mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise cannot_write(folder, error, "choose a folder of yours with --folder") from error
     if foreign is not None:
         results.manifest.write(PARITY, foreign.to_json())
     config = config_text(experiment, definition)
-    if stored is None or read_text(folder / CONFIG, MAKE_ONE) != config:
+    if not stored or read_text(folder / CONFIG, MAKE_ONE) != config:
         results.write(CONFIG, config)
-    return results
-
-
-def _extended(stored: Results, experiment: Experiment) -> Experiment:
-    """A folder's experiment with what is new in another one."""
-    try:
-        return stored.experiment.extended(experiment)
-    except InvalidInput as error:
-        raise FileProblem(
-            stored.folder,
-            f"holds another experiment ({error})",
-            "leave these options out to go on with it, or choose another folder",
-        ) from error
 
 
 def _check_strides(results: Results) -> None:
@@ -88,23 +69,16 @@ def _check_strides(results: Results) -> None:
         results.has(cell)
 
 
-def _check_definition(stored: Results, now: Definition) -> None:
+def _check_definition(folder: Path, now: Definition) -> None:
     """What the folder was begun with is what it means today."""
-    before = read_definition(stored.folder)
+    before = read_definition(folder)
     kept = {key: part for key, part in now.items() if key in before}
     for key in ("gaits", "controllers", "scenarios"):
         kept[key] = {name: part for name, part in now[key].items() if name in before[key]}
     if kept != before:
         raise FileProblem(
-            stored.folder, f"was begun with another {differences(before, kept)}", SIMULATE_AGAIN
+            folder, f"was begun with another {differences(before, kept)}", SIMULATE_AGAIN
         )
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        (folder / "strides").mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        raise cannot_write(folder, error, "choose a folder of yours with --folder") from error
 
 
 def check_completion(results: Results) -> None:
