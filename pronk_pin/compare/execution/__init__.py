@@ -4,8 +4,6 @@ Comes in: an `Experiment`, a folder, and who is to simulate.
 Goes out: the `Results` of all its cells.
 """
 
-from .demand import check_demand
-from .executors import known_address
 from .run import run_experiment
 
-__all__ = ["check_demand", "known_address", "run_experiment"]
+__all__ = ["run_experiment"]

@@ -254,6 +254,13 @@ def answer_in_words(summary: pd.DataFrame, *, table: pd.DataFrame | None = None)
     return said or _joined(unsaid(table), _where_robots_fell(table))
 
 
+def format_summary(summary: pd.DataFrame) -> str:
+    """Tables and verdict as text for a terminal: `format_tables` of one scenario, `format_suite` of
+    many."""
+    worlds = families(list(summary["scenario"].unique()))
+    return format_suite(summary) if len(worlds) > 1 else format_tables(summary, scenario=worlds[0])
+
+
 def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
     """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
     table = answer(in_family(summary, scenario))
