@@ -166,16 +166,13 @@ class Explain:
         strides = results.all_strides(controller=self.controller, scenario=self.scenario)
         rng = np.random.default_rng(self.seed)
         explanation = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
-        print(f"{cell.controller} in scenario {cell.scenario}\n\n{describe(explanation)}")
+        text = describe(explanation)
+        print(f"{cell.controller} in scenario {cell.scenario}\n\n{text}")
         if self.figure is not None:
             print(
                 f"\nfigure  {write_explanation_figure(explanation, self.figure, speed=self.speed)}"
             )
-        notes = [
-            f"{explanation.robot.name}, identified by what learning found",
-            "",
-            describe(explanation),
-        ]
+        notes = [f"{explanation.robot.name}, identified by what learning found", "", text]
         if self.write_urdf is not None:
             print(f"\nurdf    {write_urdf(explanation.identified, self.write_urdf, notes)}")
         if self.write_mjcf is not None:

@@ -80,7 +80,8 @@ def run_experiment(
         FileProblem: The folder cannot be written, holds another experiment or strides of one, was
             begun with other versions or another MJCF, or another run is writing there; or the MJCF
             cannot be read.
-        InvalidInput: The MJCF is not of this robot, or no worker is allowed.
+        InvalidInput: The MJCF is not of this robot, no worker is allowed, or the experiment is too
+            large: see `check_demand`.
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
     """
