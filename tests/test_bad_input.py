@@ -32,6 +32,7 @@ from pronk_pin.compare import (
     random_scenarios,
     run_experiment,
 )
+from pronk_pin.compare.results import make_folder
 from pronk_pin.compare.simulation import memory
 from pronk_pin.compare.simulation.quantities import STRIDE_QUANTITIES
 from pronk_pin.compare.studies.gain_reduction import sweep_gains
@@ -795,7 +796,8 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A results folder in which nothing was simulated yet."""
     folder = tmp_path_factory.mktemp("results") / "empty"
     both = experiment(controllers=("pd", "ilc"), scenarios=("nominal", "payload"))
-    return Results.create(both, folder).folder
+    make_folder(Results.of(both, folder))
+    return folder
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,18 @@ from .metrics import (
     COLUMNS,
     KEYS,
     STEADY_STRIDES,
+    VARIABLES,
+    CellSummary,
     by_joint,
     feedback_share,
+    join_summaries,
+    peak_history,
     reduction,
     settling_stride,
     steady,
     strides_to_converge,
     summarize,
+    summarize_cell,
 )
 from .paper_table import table_1
 from .statistics import (
@@ -35,12 +40,10 @@ from .statistics import (
 from .time_to_beat import (
     LEARNER,
     RIVAL,
-    VARIABLES,
     PeakHistory,
     beat_rows,
     beaten,
     lessons,
-    peak_history,
 )
 
 __all__ = [
@@ -53,6 +56,7 @@ __all__ = [
     "RIVAL",
     "STEADY_STRIDES",
     "VARIABLES",
+    "CellSummary",
     "Interval",
     "PeakHistory",
     "beat_rows",
@@ -64,6 +68,7 @@ __all__ = [
     "family",
     "feedback_share",
     "in_family",
+    "join_summaries",
     "lessons",
     "mean_interval",
     "peak_history",
@@ -74,6 +79,7 @@ __all__ = [
     "steady",
     "strides_to_converge",
     "summarize",
+    "summarize_cell",
     "table_1",
     "unit_of",
 ]

@@ -9,8 +9,8 @@ import pandas as pd
 from scipy import stats
 
 from ...errors import InvalidInput
-from ..experiment import Results
 from ..metrics import LEAST_UNITS, Interval, compare_pairs, family, robots
+from ..results import Results
 from .tables import SHOWN
 from .verdict import between, number
 

@@ -261,6 +261,13 @@ def answer_in_words(summary: pd.DataFrame, *, tables: Mapping[str, Overview] | N
     return said or _joined(unsaid(tables), _where_robots_fell(tables))
 
 
+def format_summary(summary: pd.DataFrame) -> str:
+    """Tables and verdict as text for a terminal: `format_tables` of one scenario, `format_suite` of
+    many."""
+    worlds = families(list(summary["scenario"].unique()))
+    return format_suite(summary) if len(worlds) > 1 else format_tables(summary, scenario=worlds[0])
+
+
 def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
     """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
     tables = answer(in_family(summary, scenario))

@@ -27,8 +27,8 @@ from ...dynamics import Rotors
 from ...errors import InvalidInput
 from ...gait import load_library
 from ...robot import JOINTS, load_robot
-from ..experiment import Results
 from ..report import number
+from ..results import Results
 from ..simulation import Schedule, simulate
 from ..world import Scenario
 from .learning_runs import learning_law

@@ -13,9 +13,9 @@ import pandas as pd
 import xarray as xr
 
 from ...robot import JOINTS
-from ..experiment import Results
 from ..metrics import by_joint, mean_interval, robots, steady, table_1
 from ..report import SHOWN, number
+from ..results import Results
 
 _SETTLED = 0.05
 """Time after which the touchdown transient is over [s]."""

@@ -14,8 +14,9 @@ import pytest
 import xarray as xr
 
 from pronk_pin.compare import Results, summarize
+from pronk_pin.compare.metrics.metrics import peak_history
 from pronk_pin.compare.metrics.statistics import compare_controllers
-from pronk_pin.compare.metrics.time_to_beat import lessons, peak_history
+from pronk_pin.compare.metrics.time_to_beat import lessons
 from pronk_pin.compare.report.difference import format_changes
 from pronk_pin.compare.report.limitations import limitations
 from pronk_pin.compare.report.overview import overview
@@ -244,7 +245,6 @@ def spoil(results: Results, controller: str, **changed: float) -> None:
             finished = strides["stride"] < strides["count"]
             values = {name: xr.where(finished, value, np.nan) for name, value in changed.items()}
             results.save(cell, strides.assign(values).assign_attrs(strides.attrs))
-    results.summarize()
 
 
 def test_the_summary_counts_what_taught_nothing_and_why(copy: Results) -> None:

@@ -18,10 +18,10 @@ import pytest
 from pronk_pin import Robot, cli
 from pronk_pin.cli.comparison import command_line
 from pronk_pin.compare import Experiment, Results, Schedule, random_scenarios, run_experiment
-from pronk_pin.compare.experiment.manifest import Manifest
 from pronk_pin.compare.experiment.suites import SUITES, load_suite
 from pronk_pin.compare.metrics.statistics import family
 from pronk_pin.compare.report.limitations import limitations
+from pronk_pin.compare.results.manifest import Manifest
 from pronk_pin.errors import FileProblem
 from pronk_pin.robot.formats.urdf import mujoco_spec
 from pronk_pin.viz.report import write_figures, write_report

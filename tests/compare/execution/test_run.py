@@ -15,7 +15,7 @@ from pronk_pin.errors import (
     SpeedOutOfRange,
     UnknownName,
 )
-from tests.compare.experiment.conftest import modified
+from tests.compare.conftest import modified
 
 
 def test_a_run_leaves_strides_summary_and_config_and_nothing_else(comparison: Results) -> None:
