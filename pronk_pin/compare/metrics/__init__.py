@@ -22,6 +22,7 @@ from .metrics import (
     summarize_cell,
 )
 from .paper_table import table_1
+from .robots import family, in_family, robots, sampled
 from .statistics import (
     CONFIDENCE,
     LEAST_UNITS,
@@ -30,11 +31,7 @@ from .statistics import (
     compare_controllers,
     compare_pairs,
     control_arm,
-    family,
-    in_family,
     mean_interval,
-    robots,
-    sampled,
     unit_of,
 )
 from .time_to_beat import (

@@ -16,7 +16,6 @@ each other.
 
 from __future__ import annotations
 
-import re
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +23,7 @@ import pandas as pd
 from scipy import stats
 
 from ..._typing import Array
+from .robots import robots
 
 CONFIDENCE = 0.95
 """Level of every interval."""
@@ -36,8 +36,6 @@ CONTROL_ARM = "ilc-zero"
 
 _NOTHING = 1e-12
 """Relative scatter that is round-off."""
-
-_SAMPLED = re.compile(r"random-(\d+)-\d+")
 
 
 class Interval(NamedTuple):
@@ -85,50 +83,6 @@ class Comparison(NamedTuple):
         if np.isnan(self.difference.low) or self.difference.holds(0.0):
             return None
         return self.difference.value < 0.0
-
-
-def family(scenario: str) -> str:
-    """What a scenario is a sample of: "random-3" for "random-3-0"; itself if it is not sampled."""
-    return _SAMPLED.sub(r"random-\1", scenario)
-
-
-def sampled(scenario: str) -> bool:
-    """Whether a world, or what `family` says of it, is a sample."""
-    return re.match(r"random-\d", scenario) is not None
-
-
-def in_family(summary: pd.DataFrame, scenario: str) -> pd.DataFrame:
-    """The rows of a world, or of a family of sampled ones."""
-    members = [name for name in summary["scenario"].unique() if family(name) == scenario]
-    return summary[summary["scenario"].isin(members)]
-
-
-def robots(
-    summary: pd.DataFrame,
-    *,
-    scenario: str,
-    controller: str,
-    metric: str = "peak_error",
-    joint: str = "calf",
-) -> pd.DataFrame:
-    """A metric of each robot: a row a unit (scenario and seed), a column a speed.
-
-    Args:
-        summary: See `compare.metrics`.
-        scenario: A scenario or a family of sampled ones.
-        controller: Whose.
-        metric: Which metric.
-        joint: Which joint, "-" for a metric of the robot.
-
-    Returns:
-        Values, NaN where the robot fell (but for the metric `upright` itself).
-    """
-    rows = in_family(summary[summary["controller"] == controller], scenario)
-    values = _pivot(rows[(rows["metric"] == metric) & (rows["joint"] == joint)])
-    if metric == "upright":
-        return values
-    upright = _pivot(rows[rows["metric"] == "upright"]).reindex_like(values)
-    return values.where(upright != 0.0)
 
 
 def mean_interval(values: pd.DataFrame) -> Interval:
@@ -198,10 +152,6 @@ def control_arm(summary: pd.DataFrame) -> float | None:
     if not {"pd", CONTROL_ARM} <= set(wide.columns):
         return None
     return float((wide[CONTROL_ARM] - wide["pd"]).abs().max())
-
-
-def _pivot(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.set_index(["scenario", "seed", "speed"])["value"].unstack("speed")
 
 
 def unit_of(values: pd.DataFrame) -> str:

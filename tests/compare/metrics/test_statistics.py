@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 from pronk_pin._typing import Array
-from pronk_pin.compare.metrics import COLUMNS
-from pronk_pin.compare.metrics.statistics import (
+from pronk_pin.compare.metrics import (
+    COLUMNS,
     CONFIDENCE,
     compare_controllers,
     compare_pairs,
