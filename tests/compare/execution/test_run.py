@@ -3,10 +3,11 @@ from __future__ import annotations
 import pickle
 from pathlib import Path
 
+import pandas as pd
 import pytest
 import xarray as xr
 
-from pronk_pin.compare import Results, run_experiment
+from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
 from pronk_pin.errors import (
     FileProblem,
     GaitNotFound,
@@ -63,6 +64,22 @@ def test_processes_give_the_same_strides_as_one_after_the_other(
     parallel = run_experiment(experiment, tmp_path / "new", workers=2, progress=False)
     for cell in experiment.cells():
         xr.testing.assert_identical(parallel.strides(cell), comparison.strides(cell))
+
+
+def test_a_run_reads_nothing_that_it_has_just_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read(*_: object, **__: object) -> None:
+        pytest.fail("strides or the summary were read")
+
+    monkeypatch.setattr("pronk_pin.compare.results.results.decode", read)
+    monkeypatch.setattr("pronk_pin.compare.results.results.read_summary", read)
+    short = Schedule(startup=0.1, baseline=1.0, learning=0.5)
+    experiment = Experiment(speeds=(0.3,), controllers=("pd", "ilc"), schedule=short)
+    summary = run_experiment(experiment, tmp_path / "new", workers=1, progress=False).summary()
+    monkeypatch.undo()
+    stored = Results.load(tmp_path / "new").summary()
+    pd.testing.assert_frame_equal(summary, stored, check_exact=True)
 
 
 def test_an_error_in_a_process_arrives_as_it_was_raised(copy: Results) -> None:
