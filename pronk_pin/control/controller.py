@@ -163,13 +163,16 @@ class Controller:
         zero = np.zeros_like(position)
         return Tape(zero, position, zero, np.full(n, ticks, dtype=np.intp))
 
-    def touchdown(self, rows: IntArray, learning: BoolArray | None = None) -> Tape:
+    def touchdown(
+        self, rows: IntArray, learning: BoolArray | None = None, *, late: int | None = None
+    ) -> Tape:
         """Learn from the last stride of robots that touched down, and write their stance tapes.
 
         Args:
             rows: Which robots.
             learning: Whether they learn from their last stride first, shape (len(rows),); by
                 default none does.
+            late: Ticks ago that they touched down; by default those of the specification.
         """
         usable = self.skipped[rows] == 0
         learns = np.zeros(len(rows), dtype=bool)
@@ -184,7 +187,7 @@ class Controller:
             position=position,
             velocity=reference.velocity[rows],
             length=reference.ticks[rows],
-            begin=self.spec.touchdown_ticks,
+            begin=self.spec.touchdown_ticks if late is None else late,
         )
 
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:

@@ -134,7 +134,7 @@ class TickLog:
 
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
         """Move the ticks from `start` (m,) on to the beginning, as the first of the next phase."""
-        kept = start[:, None] + np.arange(ticks)  # (m, ticks)
+        kept = np.minimum(start[:, None] + np.arange(ticks), self.size - 1)  # (m, ticks)
         for channel in self._channels:
             channel[rows, :ticks] = channel[rows[:, None], kept]
 

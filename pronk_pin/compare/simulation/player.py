@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..._typing import Array, IntArray
+from ..._typing import Array, BoolArray, IntArray
 from ...control import Balance, ControllerSpec, PhaseLog, Tape, TouchdownDetector
 from ...gait import Gait
 from ...robot import Robot
@@ -40,6 +40,7 @@ class Player:
         sensed: The same as the robots know it: the log itself, where nothing is noisy.
         falls: Detects falls.
         upright: Which robots have not fallen, shape (n,).
+        late: Ticks by which their last touchdowns were felt late, as far as they know, shape (n,).
     """
 
     def __init__(
@@ -60,7 +61,14 @@ class Player:
         servo = spec.gains if known and scenario.affine else None
         self.world = World(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
-        self.sensors = SensorSuite(scenario.sensors, n, rng)
+        dt = scenario.timestep
+        self.sensors = SensorSuite(
+            scenario.sensors,
+            n,
+            rng,
+            latency=round(scenario.touchdown_latency / dt),
+            jitter=round(scenario.touchdown_jitter / dt),
+        )
         self.log = TickLog(n, ticks, turns=not level)
         flight = np.array([gait.flight.duration for gait in gaits])
         self._playback: Playback
@@ -75,8 +83,11 @@ class Player:
         self.sensed = self._playback.sensed
         self._gains, self._balance = spec.gains, balance
         self._level_imu = spec.imu and level  # read a phase at a time
-        self._touchdown_delay = spec.touchdown_ticks
-        self._touchdown = TouchdownDetector(spec.contact, robot, flight, timestep=scenario.timestep)
+        self.late = np.full(n, spec.touchdown_ticks, dtype=np.intp)
+        self._touchdown = TouchdownDetector(
+            spec.contact, robot, flight, timestep=dt, lateness=spec.touchdown_ticks
+        )
+        self._sensor_late, self._reference_end = np.zeros((2, n), dtype=np.intp)  # of each flight
         self.falls = FallDetector(gaits)
         self.upright = np.ones(n, dtype=bool)
 
@@ -93,6 +104,9 @@ class Player:
         """
         playback, log, sensed = self._playback, self.log, self.sensed
         airborne = part == 1
+        if airborne:
+            self._sensor_late[rows] = self.sensors.touchdown_lateness(rows)
+            self._reference_end[rows] = tape.reference_end
         played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
         while going.size:
             who, end = rows[going], int(tape.length[going].max())
@@ -109,7 +123,10 @@ class Player:
             self._restart_broken(who)
             going, tick = going[played[going] > stop], stop
         if airborne:
-            played = np.maximum(played, 1 + self._touchdown_delay)  # even if it broke before
+            self.late[rows] = self._touchdown.lateness(
+                rows, sensed.joint_rates, played, self._reference_end[rows]
+            )
+            played = np.maximum(played, 1 + self.late[rows])  # even if it broke before
         tau_max = self.world.robot.tau_max
         sensed.torques(rows, tape, self._gains, tau_max, int(played.max()))
         if sensed is not log:
@@ -127,7 +144,7 @@ class Player:
         count = tick + 1 + np.arange(motion.base.shape[1])  # ticks played after each step
         over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
         if airborne:
-            over |= self._touchdown.felt(rows, motion.force, count)
+            over |= self._felt(rows, count)
         if self.falls.broken(motion.path[:, -1]).any():
             over |= self.falls.broken(motion.path[:, 1:])
         ended = over.any(axis=1)
@@ -135,6 +152,15 @@ class Player:
         fallen = self.falls.fallen(rows, motion) & (count <= ends[:, None])
         self.upright[rows] &= ~fallen.any(axis=1)
         return ends
+
+    def _felt(self, rows: IntArray, count: IntArray) -> BoolArray:
+        """Whether touchdowns are felt after so many ticks (k,) of the flights, shape (m, k)."""
+        detector, sensed = self._touchdown, self.sensed
+        told = count - self._sensor_late[rows, None]  # (m, k)
+        load = detector.load(rows, sensed.force[rows[:, None], np.maximum(told - 1, 0)], told)
+        ticks = slice(int(count[0]) - 1, int(count[-1]))
+        end = self._reference_end[rows]
+        return load | detector.impact(rows, sensed.joint_rates, ticks, end)
 
     def _restart_broken(self, rows: IntArray) -> None:
         """Reset robots with states that are not finite to rest; they have fallen."""
@@ -156,7 +182,7 @@ class Player:
     def rewind(self, rows: IntArray, start: IntArray) -> None:
         """Give the ticks from `start` (m,) on, before a touchdown is sensed, to the next stance."""
         for log in {id(log): log for log in (self.log, self.sensed)}.values():
-            log.rewind(rows, start, self._touchdown_delay)
+            log.rewind(rows, start, int(self.late[rows].max()))
 
     def tilt(self, part: int, rows: IntArray, length: IntArray) -> Array:
         """Largest angle between trunk and gait in a part of the stride [rad], shape (m,)."""

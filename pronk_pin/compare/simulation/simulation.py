@@ -131,7 +131,9 @@ class Simulation:
 
         def strides(rows: IntArray) -> None:
             while (going := rows[self._clock[rows] < steps]).size:
-                self._stride(going, steps=steps)
+                late = self.player.late[going]
+                for ticks in np.unique(late):  # those that are equally late together
+                    self._stride(going[late == ticks], steps=steps, late=int(ticks))
                 report()
 
         with without_warnings(), ThreadPoolExecutor(self._threads) as pool:
@@ -152,16 +154,19 @@ class Simulation:
             self.player.play(rows, self.controller.stand(len(piece)), part=None)
         self.player.rewind(rows, np.full(len(rows), len(piece) - late))
 
-    def _stride(self, rows: IntArray, *, steps: int) -> None:
-        """Simulate one stride of some robots, from touchdown to touchdown."""
+    def _stride(self, rows: IntArray, *, steps: int, late: int) -> None:
+        """Simulate one stride of some robots, from touchdown to touchdown.
+
+        The first was felt late by so many ticks.
+        """
         controller, strides, player = self.controller, self.strides, self.player
-        log, late = player.log, controller.spec.touchdown_ticks
+        log = player.log
         start = self._clock[rows]
         learning = start >= round(self.schedule.baseline / self._dt)
         learning &= any(law is not None for law in controller.spec.laws)
         strides.begin(rows, self._seconds(start), learning, remaining=self._seconds(steps - start))
 
-        stance = player.play(rows, controller.touchdown(rows, learning), part=0)
+        stance = player.play(rows, controller.touchdown(rows, learning, late=late), part=0)
         tape, record = controller.liftoff(rows, player.measured(rows, stance, sensed=late))
         if player.sensed is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, sensed=late))
@@ -169,7 +174,8 @@ class Simulation:
         tilt = player.tilt(0, rows, stance)
 
         # A touchdown is felt late: the last ticks of the flight's tape are the next stance's.
-        flight = player.play(rows, tape, part=1) - late
+        flight = player.play(rows, tape, part=1)
+        flight -= player.late[rows]
         duration, upright = self._seconds(stance + flight), self.upright[rows]
         tilt = np.maximum(tilt, player.tilt(1, rows, flight))
         measured_log = player.measured(rows, flight)

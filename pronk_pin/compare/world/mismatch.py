@@ -89,6 +89,15 @@ KNOWN = {
         "1",
         lambda factor: {"sensors": NOISE.scaled(factor)},
     ),
+    "late-touchdown": Mismatch(
+        "contact sensor later to tell of a touchdown", 0.003, "s", _of("touchdown_latency")
+    ),
+    "touchdown-jitter": Mismatch(
+        "contact sensor up to so much later, drawn for each touchdown",
+        0.004,
+        "s",
+        _of("touchdown_jitter"),
+    ),
     "push": Mismatch("push forward and back, every 4.1 s", 3.0, "N s", _push),
     "push-side": Mismatch("push to the left and right, every 4.1 s", 1.5, "N s", _side),
 }

@@ -43,6 +43,8 @@ _NUMBERS = {
     "torque_constant": Interval(0, 10, above=True),
     "full_torque_speed": Interval(0, 1000, "rad/s"),
     "delay": Interval(0, 0.2, "s"),
+    "touchdown_latency": Interval(0, 0.05, "s"),
+    "touchdown_jitter": Interval(0, 0.05, "s"),
     "payload": Interval(0, 100, "kg"),
     "ground_time_constant": Interval(0, 1, "s", above=True),
     "ground_friction": Interval(0, 10, above=True),
@@ -88,6 +90,10 @@ class Scenario:
         payload_position: The payload's place, in the trunk's frame [m].
         com_shift: Shift of the trunk's centre of mass, its mass and inertia kept [m].
         sensors: How far the sensors are from the truth.
+        touchdown_latency: Time by which the contact sensor is later to tell of a touchdown [s], a
+            whole number of time steps.
+        touchdown_jitter: Greatest time that comes on top of that, drawn for each touchdown [s],
+            likewise.
         ground_time_constant: Time constant of the contact [s], MuJoCo's solref; larger is softer.
         ground_friction: Friction coefficient of the feet on the ground, the mu of their cones; the
             feet's and the ground's are the same. Stored results have this name.
@@ -116,6 +122,8 @@ class Scenario:
     payload_position: Vector = (0.0, 0.0, 0.06)
     com_shift: Vector = (0.0, 0.0, 0.0)
     sensors: Sensors = field(default_factory=Sensors)
+    touchdown_latency: float = 0.0
+    touchdown_jitter: float = 0.0
     ground_time_constant: float = 0.002
     ground_friction: float = 0.8
     slope: float = 0.0
@@ -142,6 +150,8 @@ class Scenario:
         text(f"{prefix}mjcf", self.mjcf)
         self._check_ground()
         self._check_motors()
+        for name in ("delay", "touchdown_latency", "touchdown_jitter"):
+            self._check_whole_steps(name)
         if not self.push_duration < self.push_period:
             raise self._wrong("push_duration must be shorter than push_period")
 
@@ -171,10 +181,12 @@ class Scenario:
         no_load = math.inf if self.no_load_speed is None else self.no_load_speed
         if not self.full_torque_speed < no_load:
             raise self._wrong("full_torque_speed must be less than no_load_speed")
-        steps = self.delay / self.timestep
+
+    def _check_whole_steps(self, name: str) -> None:
+        steps = getattr(self, name) / self.timestep
         if not abs(steps - round(steps)) < 1e-6:
             raise self._wrong(
-                f"delay must be a whole number of time steps of {self.timestep:g} s; "
+                f"{name} must be a whole number of time steps of {self.timestep:g} s; "
                 f"{round(steps) * self.timestep:g} s is the nearest"
             )
 

@@ -22,6 +22,8 @@ _LIMITS = {
 }
 """Beyond these a sensor tells nothing."""
 
+_LATENESS = Interval(0, 10_000, "ticks")
+
 
 @dataclass(frozen=True)
 class Sensors:
@@ -74,13 +76,26 @@ class SensorSuite:
         sensors: How far they are from the truth.
         n: Number of robots.
         rng: Source of the streams, which are spawned from it.
+        latency: Ticks by which touchdowns are sensed late.
+        jitter: Greatest number of ticks that come on top, drawn for each touchdown.
     """
 
-    def __init__(self, sensors: Sensors, n: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        sensors: Sensors,
+        n: int,
+        rng: np.random.Generator,
+        *,
+        latency: int = 0,
+        jitter: int = 0,
+    ) -> None:
         instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
         n = whole("n", n, Interval(1, 100_000))
         self.sensors = instance_of("sensors", sensors, Sensors)
+        self._latency = whole("latency", latency, _LATENESS)
+        self._jitter = whole("jitter", jitter, _LATENESS)
         self._streams = rng.spawn(n)
+        self._touchdown_streams = rng.spawn(n)  # the same, however many ticks are played at once
         biases = np.stack([stream.standard_normal(NL + 6) for stream in self._streams])
         self._encoder_bias = sensors.encoder_bias * biases[:, :NL]
         scale = np.repeat([sensors.gyro_bias, sensors.accelerometer_bias], 3)
@@ -101,6 +116,12 @@ class SensorSuite:
     def feet(self, rows: IntArray, force: Array) -> Array:
         """Measure the ground's forces on the feet [N], shape (m, ..., 3)."""
         return force + self.sensors.force_noise * self._noise(rows, force.shape[1:])
+
+    def touchdown_lateness(self, rows: IntArray) -> IntArray:
+        """Draw by how many ticks the next touchdowns of some robots are sensed late, shape (m,)."""
+        streams = (self._touchdown_streams[row] for row in rows)
+        jitter = [stream.integers(self._jitter, endpoint=True) for stream in streams]
+        return self._latency + np.array(jitter, dtype=np.intp)
 
     def imu(self, rows: IntArray, turning: Array, specific_force: Array) -> tuple[Array, Array]:
         """Measure angular velocity and specific force over some ticks, in the trunk's frame.

@@ -4,7 +4,7 @@ Comes in: gaits, and what was measured at every tick.
 Goes out: `Tape`, `StrideRecord`, filtered signals, and detected contacts.
 """
 
-from .contact_detection import ContactDetector, StanceContact, TouchdownDetector
+from .contact_detection import ContactDetector, ImpactDetector, StanceContact, TouchdownDetector
 from .context import ControlContext
 from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, first_order, look_ahead
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
@@ -17,6 +17,7 @@ __all__ = [
     "PARTS",
     "SAMPLES",
     "ContactDetector",
+    "ImpactDetector",
     "ControlContext",
     "FlightTiming",
     "Gains",

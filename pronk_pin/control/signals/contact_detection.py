@@ -1,13 +1,13 @@
-"""Contact detection from the load on the feet, with hysteresis."""
+"""Contact detection from the load on the feet, with hysteresis, and from the joints' rates."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from ..._checks import SHARE, Interval, keep_reals
+from ..._checks import SHARE, Interval, instance_of, keep_reals, whole
 from ..._typing import Array, BoolArray, IntArray
 from ...errors import InvalidInput
 from ...robot import Robot
@@ -25,6 +25,52 @@ class StanceContact(NamedTuple):
     """Contacts one after the other: 2 where the robot bounced once, shape (n,)."""
     share: Array
     """Share of the stance in which there was contact, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class ImpactDetector:
+    """Detects a touchdown by the impact that the joint encoders measure.
+
+    With the joints' rates v at the ticks t,
+
+        J(t) = sum_j |v_j(t) - 2 v_j(t-1) + v_j(t-2)|,
+
+    the change of their accelerations over a tick. An A1 that pronks on the nominal ground has J
+    below 1.2 rad/s in flight, and 92 to 155 at touchdown; on soft ground (10 ms) 17 to 36. Where
+    the flight's reference ends its rate steps to zero, and J is 24 to 27. White noise of 0.05 rad/s
+    in each rate makes a J of 1.2 +- 0.3.
+
+    Attributes:
+        threshold: J above which it is an impact [rad/s].
+        reference_end: The same near the end of the flight's reference [rad/s].
+        window: Ticks before a touchdown was felt in which its impact is looked for afterwards.
+    """
+
+    threshold: float = 12.0
+    reference_end: float = 40.0
+    window: int = 12
+
+    def __post_init__(self) -> None:
+        jump = Interval(0, 10_000, "rad/s", above=True)
+        keep_reals(self, {"threshold": jump, "reference_end": jump}, "impact detection: ")
+        whole("impact detection: window", self.window, Interval(0, 1000, "ticks"))
+
+    def impact(self, rates: Array, ticks: IntArray, reference_end: IntArray) -> BoolArray:
+        """Whether rates change as in an impact, shape (m, k); not where a sensor failed.
+
+        Args:
+            rates: Measured joint rates [rad/s], from two ticks before on, shape (m, k + 2, 12).
+            ticks: The ticks of the flight, shape (k,) or (m, k).
+            reference_end: Ticks from which on the flights' references are constant, shape (m,).
+        """
+        with np.errstate(invalid="ignore"):
+            jump = np.abs(np.diff(rates, n=2, axis=1)).sum(axis=-1)
+        after = ticks - reference_end[:, None]
+        near = (after >= -_BEFORE_END) & (after <= _AFTER_END)
+        return np.asarray(jump > np.where(near, self.reference_end, self.threshold))
+
+
+_BEFORE_END, _AFTER_END = 3, 1
 
 
 @dataclass(frozen=True)
@@ -46,17 +92,22 @@ class ContactDetector:
         liftoff: Load below which it ends, over the weight.
         longest: Share of the stance that a bounce takes at most.
         least: Share of the stance that has to be contact.
+        impact: Detection of touchdowns by the joint encoders, beside the load; None without.
     """
 
     touchdown: float = 0.3
     liftoff: float = 0.1
     longest: float = 0.45
     least: float = 0.5
+    impact: ImpactDetector | None = field(default_factory=ImpactDetector)
 
     def __post_init__(self) -> None:
         load = Interval(0, 100, above=True)
         checks = {"touchdown": load, "liftoff": load, "longest": SHARE, "least": SHARE}
         keep_reals(self, checks, "contact detection: ")
+        if self.impact is not None:
+            what = "an ImpactDetector, or None"
+            instance_of("contact detection: impact", self.impact, ImpactDetector, what)
         if not self.liftoff <= self.touchdown:
             raise InvalidInput(
                 f"contact detection needs liftoff <= touchdown, as shares of the weight; got "
@@ -98,28 +149,79 @@ class ContactDetector:
 
 
 class TouchdownDetector:
-    """Touchdowns of n robots: the load on their feet at a tick that is late enough in a flight.
+    """Touchdowns of n robots: load on their feet, or an impact, late enough in a flight.
+
+    What comes first counts. Where nothing is late that is the load: of an impact between two ticks
+    the feet tell at the next one, and the joints' rates one later.
 
     Args:
-        spec: The load that is a contact.
+        spec: The load and the impact that are a touchdown.
         robot: The robot.
         flight: How long their flights last [s], shape (n,).
         timestep: Length of a tick [s].
+        lateness: Ticks by which the load tells of a touchdown late, where no sensor is.
     """
 
     def __init__(
-        self, spec: ContactDetector, robot: Robot, flight: Array, *, timestep: float
+        self,
+        spec: ContactDetector,
+        robot: Robot,
+        flight: Array,
+        *,
+        timestep: float,
+        lateness: int,
     ) -> None:
         self._load = spec.touchdown * robot.mass * robot.gravity
         self._earliest = np.round(_EARLIEST_TOUCHDOWN * flight / timestep).astype(np.intp)
+        self._impact, self._lateness = spec.impact, lateness
 
-    def felt(self, rows: IntArray, force: Array, ticks: IntArray) -> BoolArray:
-        """Whether a touchdown is felt, shape (m, ticks).
+    def load(self, rows: IntArray, force: Array, ticks: IntArray) -> BoolArray:
+        """Whether a touchdown is felt by its load, shape (m, k).
 
         Args:
             rows: Which robots.
-            force: What their feet feel at each tick [N], shape (m, ticks, 4, 3).
-            ticks: How many ticks of the flight have passed then, shape (ticks,).
+            force: What their feet feel at each tick [N], shape (m, k, 4, 3).
+            ticks: How many ticks of the flight have passed then, shape (k,) or (m, k).
         """
         load = force[..., 2].sum(axis=-1) > self._load
         return np.asarray(load & (ticks > self._earliest[rows, None]))
+
+    def impact(
+        self, rows: IntArray, rates: Array, ticks: slice, reference_end: IntArray
+    ) -> BoolArray:
+        """Whether a touchdown is felt by its impact, shape (m, k).
+
+        Args:
+            rows: Which robots.
+            rates: All robots' measured joint rates in their flights [rad/s], shape (n, ticks, 12).
+            ticks: The k ticks at which to look.
+            reference_end: Ticks from which on the flights' references are constant, shape (m,).
+        """
+        felt = np.zeros((len(rows), ticks.stop - ticks.start), dtype=bool)
+        first = max(ticks.start, 2, int(self._earliest[rows].min()))
+        if self._impact is not None and first < ticks.stop:
+            at, recent = np.arange(first, ticks.stop), rates[rows, first - 2 : ticks.stop]
+            felt[:, first - ticks.start :] = self._impact.impact(recent, at, reference_end)
+            felt[:, first - ticks.start :] &= at >= self._earliest[rows, None]
+        return felt
+
+    def lateness(
+        self, rows: IntArray, rates: Array, felt: IntArray, reference_end: IntArray
+    ) -> IntArray:
+        """Find by how many ticks touchdowns were felt late, from their impacts, shape (m,).
+
+        The load would have told at the tick of the first impact in the last ones before.
+
+        Args:
+            rows, rates, reference_end: As above.
+            felt: How many ticks of the flights had passed when they were felt, shape (m,).
+        """
+        late = np.full(len(rows), self._lateness, dtype=np.intp)
+        if self._impact is None:
+            return late
+        before = np.arange(-self._impact.window, 0)
+        ticks = felt[:, None] + before  # (m, window)
+        read = np.maximum(felt[:, None] + np.arange(before[0] - 2, 0), 0)
+        impact = self._impact.impact(rates[rows[:, None], read], ticks, reference_end)
+        impact &= ticks >= np.maximum(self._earliest[rows, None], 2)
+        return np.asarray(np.where(impact.any(axis=1), late - before[impact.argmax(axis=1)], late))

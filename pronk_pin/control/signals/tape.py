@@ -84,6 +84,12 @@ class Tape:
         """Number of ticks on the tape."""
         return int(self.position.shape[1])
 
+    @property
+    def reference_end(self) -> IntArray:
+        """Ticks from which on the reference is constant, as far as it is on the tape, (n,)."""
+        moves = (self.velocity != 0.0).any(axis=-1)  # (n, ticks)
+        return np.asarray(self.ticks - np.argmax(moves[:, ::-1], axis=1), dtype=np.intp)
+
     def held(self, ticks: int) -> Tape:
         """Extend the tape to `ticks` ticks, if it is shorter, by holding the last one."""
         if ticks <= self.ticks:
