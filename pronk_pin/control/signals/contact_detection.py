@@ -42,7 +42,8 @@ class ImpactDetector:
 
     Attributes:
         threshold: J above which it is an impact [rad/s].
-        reference_end: The same near the end of the flight's reference [rad/s].
+        reference_end: The same once the flight's reference has ended [rad/s]. Motors that are late
+            step later than it does.
         window: Ticks before a touchdown was felt in which its impact is looked for afterwards.
     """
 
@@ -65,12 +66,8 @@ class ImpactDetector:
         """
         with np.errstate(invalid="ignore"):
             jump = np.abs(np.diff(rates, n=2, axis=1)).sum(axis=-1)
-        after = ticks - reference_end[:, None]
-        near = (after >= -_BEFORE_END) & (after <= _AFTER_END)
-        return np.asarray(jump > np.where(near, self.reference_end, self.threshold))
-
-
-_BEFORE_END, _AFTER_END = 3, 1
+        ended = ticks > reference_end[:, None]
+        return np.asarray(jump > np.where(ended, self.reference_end, self.threshold))
 
 
 @dataclass(frozen=True)
