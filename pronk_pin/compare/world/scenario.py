@@ -31,7 +31,7 @@ from ..._checks import (
 from ..._checks import seed as known_seed
 from ...errors import InvalidInput, UnknownName
 from ...storage import from_text
-from .mismatch import KNOWN, ROTOR
+from .mismatch import KNOWN, NOISE, ROTOR
 from .sensors import Sensors
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -302,7 +302,7 @@ def _written(part: str, value: float) -> str:
 
 
 def random_scenarios(n: int, seed: int) -> tuple[Scenario, ...]:
-    """Sampled scenarios: everything that the model alone expresses is off at once, within reason.
+    """Sampled scenarios: everything that may be off is so at once, within reason.
 
     Args:
         n: How many.
@@ -322,6 +322,10 @@ def _sample(seed: int, index: int) -> Scenario:
     def draw(low: float, high: float) -> float:
         return float(rng.uniform(low, high))
 
+    def draw_ms(most: int) -> float:
+        """A whole number of milliseconds [s]."""
+        return int(rng.integers(most, endpoint=True)) / 1000
+
     return Scenario(
         f"random-{seed}-{index}",
         armature=draw(0.6, 1.8) * ROTOR,
@@ -334,6 +338,11 @@ def _sample(seed: int, index: int) -> Scenario:
         ground_time_constant=0.002 * 4.0 ** draw(0.0, 1.0),
         ground_friction=draw(0.5, 1.0),
         slope=draw(-0.06, 0.06),
+        # What was drawn before stays as it is: anything more comes after it.
+        delay=draw_ms(4),
+        touchdown_latency=draw_ms(3),
+        touchdown_jitter=draw_ms(4),
+        sensors=NOISE.scaled(draw(0.0, 0.5)),
     )
 
 
