@@ -107,6 +107,11 @@ def test_a_value_in_a_name_is_the_value_to_the_bit() -> None:
         ("payload=nan", "needs a number after '='"),
         ("payload=", "needs a number after '='"),
         ("payload=-1", r"payload=-1\.0; give a number from 0 to 100 kg"),
+        (
+            "touchdown-jitter=0.0015",
+            "touchdown_jitter must be a whole number of time steps",
+        ),
+        ("late-touchdown=-0.001", "touchdown_latency=-0.001; give a number from 0 to 0.05 s"),
         ("delay=0.0015", "delay must be a whole number of time steps of 0.001 s; 0.002 s is"),
     ],
 )
@@ -120,7 +125,17 @@ def test_sampled_worlds_are_known_by_seed_and_index_whatever_their_number() -> N
     assert family[:2] == random_scenarios(2, 7)
     assert [load_scenario(scenario.name) for scenario in family] == list(family)
     assert len({scenario.payload for scenario in (*family, *random_scenarios(4, 8))}) == 8
-    assert all(scenario.affine for scenario in family)
+
+
+def test_a_sampled_world_is_what_it_was_and_its_motors_and_sensors_are_off_besides() -> None:
+    sampled = load_scenario("random-0-3")
+    assert (sampled.armature, sampled.slope) == (0.009397292506141113, -0.02623944394288679)
+    family = random_scenarios(200, 0)
+    assert load_scenario("noise+late-touchdown+touchdown-jitter").touchdown_latency == 0.003
+    for name, most in (("delay", 4), ("touchdown_latency", 3), ("touchdown_jitter", 4)):
+        assert {round(1000 * getattr(each, name), 9) for each in family} == set(range(most + 1))
+    noise = [each.sensors.rate_noise for each in family]
+    assert 0.0 <= min(noise) < max(noise) <= 0.025
 
 
 @pytest.mark.parametrize(("n", "seed"), [(0, 0), (1, -1)])
@@ -133,7 +148,17 @@ def test_no_sampled_world_and_no_negative_seed(n: int, seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["nominal", "payload-front", "slope", "steps", "push", "push-side", "random-0-0"]
+    "name",
+    [
+        "nominal",
+        "payload-front",
+        "slope",
+        "steps",
+        "push",
+        "push-side",
+        "late-touchdown",
+        "touchdown-jitter",
+    ],
 )
 def test_what_the_compiled_model_expresses_is_affine(name: str) -> None:
     assert load_scenario(name).affine

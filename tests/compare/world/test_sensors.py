@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -71,6 +72,36 @@ def test_what_a_robot_measures_does_not_depend_on_how_often_others_are_asked() -
     one, both = (suite.encoders(np.array([0, 1]), zero, zero)[0] for suite in (alone, among))
     np.testing.assert_array_equal(one[0], both[0])
     assert np.any(one[1] != both[1])
+
+
+def test_a_touchdown_is_late_by_the_latency_and_up_to_the_jitter_alike() -> None:
+    suite = SensorSuite(Sensors(), 3, np.random.default_rng(0), latency=2, jitter=4)
+    drawn = np.array([suite.touchdown_lateness(np.arange(3)) for _ in range(2000)])
+    assert (drawn.min(), drawn.max()) == (2, 6)
+    for robot in drawn.T:
+        np.testing.assert_allclose(np.bincount(robot - 2) / 2000, 0.2, atol=0.03)
+    assert np.any(drawn[:, 0] != drawn[:, 1])
+    punctual = SensorSuite(Sensors(), 3, np.random.default_rng(0), latency=3)
+    assert punctual.touchdown_lateness(np.array([2, 0])).tolist() == [3, 3]
+
+
+def test_a_robots_jitter_is_its_own_and_leaves_its_noise_as_it_is() -> None:
+    alone, among = (SensorSuite(NOISE, 2, np.random.default_rng(7), jitter=4) for _ in range(2))
+    zero = np.zeros((2, 12))
+    for _ in range(3):
+        among.touchdown_lateness(np.array([1]))
+    one, both = (suite.encoders(np.array([0, 1]), zero, zero)[0] for suite in (alone, among))
+    np.testing.assert_array_equal(one, both)
+    first, second = (
+        [suite.touchdown_lateness(np.array([0]))[0] for _ in range(9)] for suite in (alone, among)
+    )
+    assert first == second
+
+
+@pytest.mark.parametrize("wrong", [{"latency": -1}, {"jitter": 0.5}])
+def test_a_lateness_that_cannot_be_is_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InvalidInput, match=r"(latency=-1|jitter=0.5 is a float); give a whole"):
+        SensorSuite(Sensors(), 1, np.random.default_rng(0), **wrong)
 
 
 @pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
