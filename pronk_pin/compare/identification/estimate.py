@@ -7,6 +7,12 @@ normal equations are made of pairs of different strides,
 
 whose noise is independent: instrumental variables, with every other stride as the instrument (all
 split halves at once). The rows' weights W are robust, so that what no term describes is outvoted.
+
+The delay shifts the commanded torque, and is not linear. The profile of the least squares over
+delays a millisecond apart says where to begin; from there each round linearises about the delay of
+the last one (Gauss and Newton). In the end the delay stands among the linear parameters with its
+own column, so that covariance and intervals are joint ones, and those of the others hold the
+uncertainty of the shift.
 """
 
 from __future__ import annotations
@@ -18,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.optimize
 
-from ..._typing import Array, BoolArray
-from .equations import GROUPS, Equations
+from ..._typing import Array, BoolArray, IntArray
+from .equations import GROUPS, DelayedEquations, Equations
 from .model_terms import Term
 
 _ROUNDS = 12
@@ -72,7 +78,7 @@ class Estimate:
 
 
 def estimate(
-    rows: Mapping[float, Equations],
+    equations: Mapping[float, DelayedEquations],
     terms: tuple[Term, ...],
     *,
     rng: np.random.Generator,
@@ -82,7 +88,7 @@ def estimate(
     """Fit the terms to the rows of all speeds.
 
     Args:
-        rows: The rows by speed.
+        equations: The rows by speed.
         terms: The terms.
         rng: Source of the strides and speeds drawn for the intervals.
         draws: How many.
@@ -90,29 +96,60 @@ def estimate(
             that do not repeat: biased by noise.
     """
     scale = np.array([term.scale for term in terms])
-    weights = {speed: _flight_first(equations) for speed, equations in rows.items()}
+    weights = {speed: _flight_first(each.group) for speed, each in equations.items()}
     sigma = np.ones(len(GROUPS))
-    value = np.zeros(len(terms))
+    value = _start(equations, weights, terms, others)
     normal: dict[float, Normal] = {}
     for _ in range(_ROUNDS):
+        rows = {speed: each.at(value) for speed, each in equations.items()}
         normal = {
-            speed: _normal(equations, weights[speed] / sigma[equations.group] ** 2, scale)
-            for speed, equations in rows.items()
+            speed: _normal(each, weights[speed] / sigma[each.group] ** 2, scale)
+            for speed, each in rows.items()
         }
         value = _solve(*_sum(normal, others), terms)
-        residual = {
-            speed: equations.y.mean(axis=0) - equations.A.mean(axis=0) @ value
-            for speed, equations in rows.items()
-        }
+        rows = {speed: each.at(value) for speed, each in equations.items()}
+        residual = {speed: _mean_residual(each, value) for speed, each in rows.items()}
         sigma = _spread(rows, residual)
         weights = {
-            speed: _tukey(residual[speed] / sigma[equations.group])
-            for speed, equations in rows.items()
+            speed: _tukey(residual[speed] / sigma[each.group]) for speed, each in rows.items()
         }
     information, _ = total = _sum(normal, others)
     free = _unbounded(*total) * scale
     drawn = np.array([_unbounded(*_drawn(normal, others, rng)) for _ in range(draws)]) * scale
     return Estimate(value, drawn - free, information, *_fit(rows, value))
+
+
+def _start(
+    equations: Mapping[float, DelayedEquations],
+    weights: Mapping[float, Array],
+    terms: tuple[Term, ...],
+    others: bool,
+) -> Array:
+    """The parameters to begin with: the best of the delays on a grid, with the others' estimates
+    given it."""
+    delay = next((k for k, term in enumerate(terms) if term.column is None), None)
+    if delay is None:
+        return np.zeros(len(terms))
+    linear = (*terms[:delay], *terms[delay + 1 :])
+    scale = np.array([term.scale for term in linear])
+    best, least = np.zeros(len(terms)), np.inf
+    for shift in next(iter(equations.values())).torque.x:
+        if not terms[delay].lower <= shift <= terms[delay].upper:
+            continue
+        rows = {speed: each.given_delay(shift) for speed, each in equations.items()}
+        normal = {speed: _normal(each, weights[speed], scale) for speed, each in rows.items()}
+        value = _solve(*_sum(normal, others), linear)
+        squares = sum(
+            float(weights[speed] @ _mean_residual(each, value) ** 2) for speed, each in rows.items()
+        )
+        if squares < least:
+            best, least = np.insert(value, delay, shift), squares
+    return best
+
+
+def _mean_residual(rows: Equations, value: Array) -> Array:
+    """What parameters leave of the strides' mean, shape (m,)."""
+    return np.asarray(rows.y.mean(axis=0) - rows.A.mean(axis=0) @ value)
 
 
 def _fit(rows: Mapping[float, Equations], value: Array) -> tuple[Array, Array, Array]:
@@ -132,9 +169,9 @@ def _fit(rows: Mapping[float, Equations], value: Array) -> tuple[Array, Array, A
     return residual, noise, size
 
 
-def _flight_first(rows: Equations) -> Array:
+def _flight_first(group: IntArray) -> Array:
     """Weights to begin with: flight, where no contact can mislead, if it was recorded."""
-    flying = rows.group >= 2
+    flying = group >= 2
     return np.where(flying, 1.0, 0.0) if flying.any() else np.ones(len(flying))
 
 

@@ -16,7 +16,7 @@ from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ...robot import ModelParameters, Robot, load_robot
 from ..world import Scenario
-from .equations import Equations, PhaseForces, equations, phase_forces
+from .equations import DelayedEquations, PhaseForces, equations, phase_forces
 from .estimate import Confounding, Estimate, confounding, estimate, repetition
 from .ground_survey import Ground, survey
 from .model_terms import TERMS, Term, parameters, truth
@@ -139,7 +139,7 @@ def explain(
         speed: tuple(phase_forces(robot, phase, terms) for phase in phases)
         for speed, phases in recorded.items()
     }
-    rows = {speed: equations(robot, phases_) for speed, phases_ in forces.items()}
+    rows = {speed: equations(robot, phases_, terms) for speed, phases_ in forces.items()}
     used, repeated = _repeating(rows, terms)
     fit = estimate({v: rows[v] for v in used}, terms, rng=rng, draws=draws, others=repeated)
     played = _gaits(strides, gaits)
@@ -180,11 +180,13 @@ def check_learner(controller: str) -> None:
 
 
 def _repeating(
-    rows: Mapping[float, Equations], terms: tuple[Term, ...]
+    rows: Mapping[float, DelayedEquations], terms: tuple[Term, ...]
 ) -> tuple[list[float], bool]:
     """Speeds whose strides repeat, or all of them where none do; whether they do."""
     repeating = [
-        speed for speed, equations in rows.items() if repetition(equations, terms) > REPEATS
+        speed
+        for speed, each in rows.items()
+        if repetition(each.at(np.zeros(len(terms))), terms) > REPEATS
     ]
     return (repeating, True) if repeating else (list(rows), False)
 
