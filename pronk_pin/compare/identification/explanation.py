@@ -15,13 +15,13 @@ from ...control import CONTROLLERS
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ...robot import ModelParameters, Robot, load_robot
-from ..world import Scenario
 from .equations import DelayedEquations, PhaseForces, equations, phase_forces
 from .estimate import Confounding, Estimate, confounding, estimate, repetition
 from .ground_survey import Ground, survey
-from .model_terms import TERMS, Term, parameters, truth
+from .model_terms import TERMS, Term, parameters
 from .recording import PARTS, PhaseRecording, recordings
 from .shares import share_table, shares
+from .truth import true_parameters
 
 IMU_NOISE = Interval(0, 1000, "m/s^2")
 DRAWS = Interval(2, 1_000_000)
@@ -160,7 +160,7 @@ def explain(
         left_out=tuple(float(v) for v in strides["speed"].to_numpy() if float(v) not in set(used)),
         strides=min(forces[speed][0].recording.strides for speed in used),
         repeated=repeated,
-        true=_truth(strides),
+        true=true_parameters(robot, strides),
         attributes={key: str(value) for key, value in strides.attrs.items()},
     )
 
@@ -207,11 +207,3 @@ def _by_part(phases: tuple[PhaseForces, ...]) -> dict[str, PhaseForces]:
 
 def _stances(recorded: Iterable[tuple[PhaseRecording, ...]]) -> list[PhaseRecording]:
     return [phase for phases in recorded for phase in phases if phase.part == "stance"]
-
-
-def _truth(strides: xr.Dataset) -> dict[str, float]:
-    """The true parameters, as the strides' attributes tell them."""
-    try:
-        return truth(Scenario.from_json(strides.attrs["scenario_parameters"]))
-    except (KeyError, InvalidInput):
-        return {}

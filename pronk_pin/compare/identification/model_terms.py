@@ -21,7 +21,6 @@ import pinocchio as pin
 
 from ..._typing import Array
 from ...robot import JOINTS, NB, NOTHING, ModelParameters, Robot
-from ..world import Scenario
 
 
 class Motion(NamedTuple):
@@ -201,25 +200,3 @@ def parameters(values: Mapping[str, float], robot: Robot) -> ModelParameters:
         trunk_shift=shift,
         torque_constant=1.0 - values.get("weak motors", 0.0),
     )
-
-
-def truth(scenario: Scenario) -> dict[str, float]:
-    """The terms' true parameters in a simulated scenario, as far as it names them."""
-    by_joint = {
-        f"{joint} {name}": getattr(scenario, field)
-        for joint in JOINTS
-        for field, name in (
-            ("armature", "armature"),
-            ("damping", "damping"),
-            ("coulomb", "Coulomb"),
-        )
-    }
-    x, _, z = scenario.payload_position
-    return {
-        **by_joint,
-        "payload": scenario.payload,
-        "trunk moment x": scenario.payload * x,
-        "trunk moment z": scenario.payload * z,
-        "weak motors": 1.0 - scenario.torque_constant,
-        "delay": scenario.delay,
-    }

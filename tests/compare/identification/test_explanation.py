@@ -29,11 +29,17 @@ from pronk_pin.compare import (
     run_experiment,
 )
 from pronk_pin.compare.identification import TERMS, Term, explained, foreign, remarks
-from pronk_pin.compare.identification.equations import equations, ground_free, phase_forces
+from pronk_pin.compare.identification.equations import (
+    DelayedEquations,
+    equations,
+    ground_free,
+    phase_forces,
+)
 from pronk_pin.compare.identification.estimate import estimate
-from pronk_pin.compare.identification.model_terms import Motion, parameters, truth
-from pronk_pin.compare.identification.recording import recordings
+from pronk_pin.compare.identification.model_terms import Motion, parameters
+from pronk_pin.compare.identification.recording import PhaseRecording, recordings
 from pronk_pin.compare.identification.shares import discrepancy
+from pronk_pin.compare.identification.truth import truth
 from pronk_pin.compare.simulation.dataset import to_dataset
 from pronk_pin.compare.studies.identified_models import close_loop, format_loop
 from pronk_pin.control import load_controller
@@ -110,8 +116,13 @@ def found(learned_strides: xr.Dataset) -> Explanation:
 
 
 def true_values(scenario: Scenario) -> Array:
-    by_name = truth(scenario)
+    by_name = truth(load_robot("a1"), scenario)
     return np.array([by_name[term.name] for term in TERMS])
+
+
+def rows_of(robot: Robot, phases: tuple[PhaseRecording, ...]) -> DelayedEquations:
+    forces = tuple(phase_forces(robot, phase, TERMS) for phase in phases)
+    return equations(robot, forces, TERMS)
 
 
 def random_motion(robot: Robot, n: int) -> Motion:
@@ -122,8 +133,7 @@ def random_motion(robot: Robot, n: int) -> Motion:
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     v, a = rng.standard_normal((2, n, 18))
     v[:, 6:] = np.sign(v[:, 6:]) * (3.0 + np.abs(v[:, 6:]))
-    tau, rate = rng.standard_normal((2, n, 12))
-    return Motion(q, v, a, v[:, 6:], np.sign(v[:, 6:]), tau, rate)
+    return Motion(q, v, a, v[:, 6:], np.sign(v[:, 6:]), rng.standard_normal((n, 12)))
 
 
 _OF_JOINTS = [term for term in TERMS if term.cause not in ("load", "delay")]
@@ -191,7 +201,7 @@ def test_with_the_true_parameters_nothing_is_left_of_mujocos_motion(
 ) -> None:
     true = true_values(COMBINED)
     for phases in recordings(learned_strides).values():
-        rows = equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
+        rows = rows_of(robot, phases).at(true)
         rest = rows.y - rows.A @ true
         for group, most in ((0, 0.05), (1, 0.05), (3, 0.005), (4, 0.005)):
             mine = rows.group == group
@@ -207,7 +217,7 @@ def test_a_torque_stamped_a_tick_late_spoils_everything(
     late["tick_torque"] = learned_strides["tick_torque"].shift(tick=1).fillna(0.0)
     for strides in (learned_strides, late):
         phases = next(iter(recordings(strides).values()))
-        rows = equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
+        rows = rows_of(robot, phases).at(true)
         mine = rows.group == 4
         rest.append(np.sqrt(np.mean((rows.y - rows.A @ true)[:, mine] ** 2)))
     assert rest[1] > 3.0 * rest[0]
@@ -261,7 +271,7 @@ def test_other_strides_as_instruments_take_the_noise_bias_away(
     rng = np.random.default_rng(5)
     loud = with_noise(with_noise(learned_strides, rng), rng)
     rows = {
-        speed: equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
+        speed: rows_of(robot, phases)
         for speed, phases in recordings(loud, imu_noise=IMU, rng=rng).items()
     }
     true = true_values(COMBINED)
