@@ -172,8 +172,8 @@ def recordings(
 def _torque_before(torque: xr.DataArray, part: str, count: int) -> Array:
     """The last torques before a part of each stride of one speed, shape (last, count, 12).
 
-    Before a stance they are those of the flight of the stride before, which the first stride lacks:
-    it has the mean of the others', whose feedforward was nearly the same.
+    Before a stance they are those of the flight of the stride before. Where that was not recorded,
+    as with the first stride, the next stride's stand in.
     """
     other = PARTS[1 - PARTS.index(part)]
     values = torque.sel(part=other).transpose("last", "tick", "joint").to_numpy().astype(float)
@@ -183,9 +183,10 @@ def _torque_before(torque: xr.DataArray, part: str, count: int) -> Array:
         before[row, count - len(known) :] = known
     if part == PARTS[0]:
         before[1:], before[0] = before[:-1].copy(), np.nan
-    missing = np.isnan(before)
-    known_count = np.maximum((~missing).sum(axis=0), 1)
-    return np.where(missing, np.nansum(before, axis=0) / known_count, before)
+    rows = range(len(before) - 1)
+    for row, neighbour in [*((k, k + 1) for k in rows[::-1]), *((k + 1, k) for k in rows)]:
+        before[row] = np.where(np.isnan(before[row]), before[neighbour], before[row])
+    return np.nan_to_num(before)
 
 
 def _lean(strides: xr.Dataset) -> Array:
