@@ -25,6 +25,8 @@ DELAYS = (0.0, 0.001, 0.002, 0.003, 0.004, 0.005)
 """Of the motors [s]; the i-th world has the i-th, in turn."""
 NOISE = {"tick_joints": 5e-4, "tick_joint_rates": 0.05, "tick_torque": 0.1}
 """Of encoders [rad, rad/s] and of the current [N m], white."""
+NEAR = 0.05
+"""Error that counts as near, over the truth where that is not zero."""
 IMU_NOISE = 0.3
 """Of the accelerometer [m/s^2]."""
 
@@ -90,6 +92,7 @@ def coverage(table: pd.DataFrame) -> pd.DataFrame:
             "inside": (table["low"] <= table["true"]) & (table["true"] <= table["high"]),
             "error": error,
             "relative": (error / table["true"].abs()).where(table["true"] != 0.0),
+            "near": (error <= NEAR * table["true"].abs()).where(table["true"] != 0.0),
             "half": 0.5 * (table["high"] - table["low"]),
         }
     )
@@ -101,6 +104,7 @@ def coverage(table: pd.DataFrame) -> pd.DataFrame:
             "median error": by_term["error"].median(),
             "worst error": by_term["error"].max(),
             "median relative": by_term["relative"].median(),
+            "near": by_term["near"].mean(),
             "half interval": by_term["half"].median(),
             "unit": table["unit"].groupby(level="term", sort=False).first(),
         }
@@ -111,13 +115,13 @@ def format_coverage(table: pd.DataFrame) -> str:
     """Format the table, and the share of all intervals that hold the truth."""
     lines = [
         f"{'term':<16}{'worlds':>7}{'inside':>8}{'median error':>14}{'worst':>10}"
-        f"{'of truth':>10}{'half interval':>15}  unit"
+        f"{'of truth':>10}{f'in {NEAR:.0%}':>8}{'half interval':>15}  unit"
     ]
     for name, row in table.iterrows():
         lines.append(
             f"{name:<16}{row['worlds']:>7}{row['inside']:>8.0%}{row['median error']:>14.5f}"
             f"{row['worst error']:>10.5f}{row['median relative']:>10.2%}"
-            f"{row['half interval']:>15.5f}  {row['unit']}"
+            f"{row['near']:>8.0%}{row['half interval']:>15.5f}  {row['unit']}"
         )
     inside = float(np.average(table["inside"], weights=table["worlds"]))
     return "\n".join([*lines, f"{'all':<16}{table['worlds'].sum():>7}{inside:>8.0%}"])

@@ -39,7 +39,7 @@ from .recording import PhaseRecording
 
 WINDOW = 0.02
 """Length of the Hann window that both sides of the equations are seen through [s]."""
-_EVERY = 0.004
+EVERY = 0.004
 """Distance of the rows [s]: a fifth of the window holds all that it lets through."""
 _SETTLED = {"stance": (0.002, 0.002), "flight": (0.03, 0.012)}
 """Times left out at the beginning and the end of a phase [s]: feet that have not left the ground
@@ -176,7 +176,9 @@ def equations(
     ]
     rows = np.concatenate(motion, axis=1)
     return DelayedEquations(
-        Equations(rows[..., 0], rows[..., 1:], np.concatenate([_kept(robot, p)[1] for p in phases])),
+        Equations(
+            rows[..., 0], rows[..., 1:], np.concatenate([_kept(robot, p)[1] for p in phases])
+        ),
         CubicSpline(delays, torque),
         tuple(k for k, term in enumerate(terms) if term.of_torque),
         next((k for k, term in enumerate(terms) if term.column is None), None),
@@ -227,9 +229,7 @@ def forces(robot: Robot, motion: Motion, terms: tuple[Term, ...]) -> tuple[Array
     return needed, np.stack(columns, axis=-1)
 
 
-def torque_forces(
-    robot: Robot, phase: PhaseForces, terms: Sequence[Term], delay: float
-) -> Array:
+def torque_forces(robot: Robot, phase: PhaseForces, terms: Sequence[Term], delay: float) -> Array:
     """Generalised force of the torque that motors late by so much [s] give, and the columns of the
     terms that depend on it, shape (k, ticks, 18, 1 + of_torque)."""
     recording = phase.recording
@@ -238,9 +238,7 @@ def torque_forces(
     given = np.zeros_like(motion.v)
     given[:, NB:] = tau
     columns = [
-        term.column(robot, motion)
-        for term in terms
-        if term.of_torque and term.column is not None
+        term.column(robot, motion) for term in terms if term.of_torque and term.column is not None
     ]
     return recording.of_ticks(np.stack([given, *columns], axis=-1))
 
@@ -292,7 +290,7 @@ def settled_ticks(phase: PhaseRecording) -> IntArray:
     """Ticks in the middle of windows that lie within what is settled of the phase."""
     half = window_half(phase.timestep)
     before, after = (round(time / phase.timestep) for time in _SETTLED[phase.part])
-    every = max(1, round(_EVERY / phase.timestep))
+    every = max(1, round(EVERY / phase.timestep))
     return np.arange(before + half, phase.ticks - after - half, every)
 
 

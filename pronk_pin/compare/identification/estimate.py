@@ -23,15 +23,18 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.optimize
+import scipy.stats
 
 from ..._typing import Array, BoolArray, IntArray
-from .equations import GROUPS, DelayedEquations, Equations
+from .equations import EVERY, GROUPS, WINDOW, DelayedEquations, Equations
 from .model_terms import Term
 
 _ROUNDS = 12
 _TUKEY = 4.685  # 95 % efficiency with normal noise
 _FLOOR = np.array([0.05, 0.05, 0.005, 0.005, 0.005])
 """Least standard deviation of a row, by group [N, N, N m, N m, N m]: no model is better."""
+_OVERLAP = WINDOW / (1.5 * EVERY)
+"""Rows that share one error: as long as a window of Hann is at equal height."""
 PRIOR = 3.0
 """Standard deviation of what is believed of a parameter beforehand, in its term's scale."""
 
@@ -53,6 +56,8 @@ class Estimate:
         value: The parameters, shape (terms,).
         draws: Deviations of the parameters, their bounds aside, with strides and speeds drawn
             anew, shape (draws, terms).
+        model_error: Standard deviation of the parameters by what no model describes, which is the
+            same in every stride, shape (terms,).
         information: How much the rows tell of the parameters, in the terms' scales; inverse of
             their covariance if the rows' errors were independent, shape (terms, terms).
         rest: Root mean square of what no term describes of the strides' mean, by group [N, N, N m,
@@ -63,6 +68,7 @@ class Estimate:
 
     value: Array
     draws: Array
+    model_error: Array
     information: Array
     rest: Array
     noise: Array
@@ -71,9 +77,13 @@ class Estimate:
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Ends of the intervals, shape (terms,) each.
 
-        Symmetric, and as if there were no bounds: an estimate on its bound is not sure of it.
+        Symmetric, and as if there were no bounds: an estimate on its bound is not sure of it. The
+        model's error adds to the scatter, which alone would promise too much where nothing is
+        noisy.
         """
-        reach = np.percentile(np.abs(self.draws), 100.0 * level, axis=0)
+        scatter = np.percentile(np.abs(self.draws), 100.0 * level, axis=0)
+        model_error = scipy.stats.norm.ppf(0.5 + 0.5 * level) * self.model_error
+        reach = np.hypot(scatter, model_error)
         return self.value - reach, self.value + reach
 
 
@@ -116,7 +126,13 @@ def estimate(
     information, _ = total = _sum(normal, others)
     free = _unbounded(*total) * scale
     drawn = np.array([_unbounded(*_drawn(normal, others, rng)) for _ in range(draws)]) * scale
-    return Estimate(value, drawn - free, information, *_fit(rows, value))
+    at_best = {
+        speed: _normal(each, weights[speed] / _FLOOR[each.group] ** 2, scale)
+        for speed, each in rows.items()
+    }
+    root, vectors = _root(_sum(at_best, others)[0])
+    model_error = scale * np.sqrt(_OVERLAP * ((vectors / root) ** 2).sum(axis=1))
+    return Estimate(value, drawn - free, model_error, information, *_fit(rows, value))
 
 
 def _start(

@@ -91,7 +91,8 @@ class PhaseRecording:
         now = commanded[:, first : first + self.ticks]
         if part == 0.0:
             return now
-        return (1.0 - part) * now + part * commanded[:, first - 1 : first - 1 + self.ticks]
+        earlier = commanded[:, first - 1 : first - 1 + self.ticks]
+        return np.asarray((1.0 - part) * now + part * earlier)
 
     def motion(self, robot: Robot) -> Motion:
         """The motion of all strides, one after the other, n = k ticks."""

@@ -68,14 +68,17 @@ def synthetic(delay: float, *, noise: float, seed: int = 0) -> Estimate:
 
 @pytest.mark.parametrize("delay", [0.0, 0.0034, 0.005, 0.0137])
 def test_a_shift_is_found_to_a_part_of_a_tick(delay: float) -> None:
-    found = dict(zip((term.name for term in SYNTHETIC), synthetic(delay, noise=0.0).value))
+    value = synthetic(delay, noise=0.0).value
+    found = {term.name: each for term, each in zip(SYNTHETIC, value, strict=True)}
     assert found["delay"] == pytest.approx(delay, abs=2e-6)
     assert found["weak motors"] == pytest.approx(WEAKNESS, abs=1e-3)
     assert found["calf armature"] == pytest.approx(ARMATURE, rel=1e-3)
 
 
 def test_intervals_hold_the_shift_and_those_of_the_others_its_uncertainty() -> None:
-    true = np.array([{"delay": 0.0034, "weak motors": WEAKNESS}.get(t.name, ARMATURE) for t in SYNTHETIC])
+    true = np.array(
+        [{"delay": 0.0034, "weak motors": WEAKNESS}.get(t.name, ARMATURE) for t in SYNTHETIC]
+    )
     inside = []
     for seed in range(40):
         low, high = synthetic(0.0034, noise=0.5, seed=seed).interval()
