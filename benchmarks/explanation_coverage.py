@@ -119,9 +119,9 @@ def format_coverage(table: pd.DataFrame) -> str:
     ]
     for name, row in table.iterrows():
         lines.append(
-            f"{name:<16}{row['worlds']:>7}{row['inside']:>8.0%}{row['median error']:>14.5f}"
-            f"{row['worst error']:>10.5f}{row['median relative']:>10.2%}"
-            f"{row['near']:>8.0%}{row['half interval']:>15.5f}  {row['unit']}"
+            f"{name:<16}{row['worlds']:>7}{row['inside']:>8.0%}{row['median error']:>14.2g}"
+            f"{row['worst error']:>10.2g}{row['median relative']:>10.2%}"
+            f"{row['near']:>8.0%}{row['half interval']:>15.2g}  {row['unit']}"
         )
     inside = float(np.average(table["inside"], weights=table["worlds"]))
     return "\n".join([*lines, f"{'all':<16}{table['worlds'].sum():>7}{inside:>8.0%}"])

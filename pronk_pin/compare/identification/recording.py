@@ -90,7 +90,7 @@ class PhaseRecording:
         first = self.before.shape[1] - int(whole)
         now = commanded[:, first : first + self.ticks]
         if part == 0.0:
-            return now
+            return np.asarray(now)
         earlier = commanded[:, first - 1 : first - 1 + self.ticks]
         return np.asarray((1.0 - part) * now + part * earlier)
 
@@ -187,7 +187,7 @@ def _torque_before(torque: xr.DataArray, part: str, count: int) -> Array:
     rows = range(len(before) - 1)
     for row, neighbour in [*((k, k + 1) for k in rows[::-1]), *((k + 1, k) for k in rows)]:
         before[row] = np.where(np.isnan(before[row]), before[neighbour], before[row])
-    return np.nan_to_num(before)
+    return np.asarray(np.nan_to_num(before))
 
 
 def _lean(strides: xr.Dataset) -> Array:

@@ -596,6 +596,31 @@ def test_intervals_hold_the_truth_in_sampled_worlds() -> None:
     assert by_term.min() >= 0.8, by_term
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("noisy", [False, True], ids=["exact", "noisy"])
+def test_intervals_hold_the_truth_in_sampled_worlds_with_late_motors(noisy: bool) -> None:
+    """As `benchmarks/explanation_coverage.py` has it, with shorter runs."""
+    rng, tables = np.random.default_rng(12), []
+    for seed in range(50):
+        delay = 0.001 * (seed % 6)
+        world = load_scenario(f"random-0-{seed}" + (f"+delay={delay:g}" if delay else ""))
+        strides = simulate_learning(world, speeds=(-0.4, 0.0, 0.4, 0.8), seed=seed)
+        if noisy:
+            tables.append(explain(with_noise(strides, rng), imu_noise=IMU, rng=rng).table())
+        else:
+            tables.append(explain(strides).table())
+    table = pd.concat(tables)
+    table = table[table["seen"]]
+    inside = (table["low"] <= table["true"]) & (table["true"] <= table["high"])
+    assert inside.mean() >= 0.9
+    assert inside.groupby(level="term").mean().min() >= 0.85
+    error = (table["estimate"] - table["true"]).abs()
+    known = table["true"] != 0.0
+    near = (error <= 0.05 * table["true"].abs())[known].groupby(level="term").mean()
+    for name in ("payload", "delay", "thigh damping", "calf damping"):
+        assert near[name] >= (0.7 if noisy else 0.95), name
+
+
 _NOMINAL = SCENARIOS["nominal"]
 
 
