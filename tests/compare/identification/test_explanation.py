@@ -563,7 +563,7 @@ def test_intervals_hold_the_truth_in_nine_of_ten_random_worlds() -> None:
     for seed in range(50):
         armature, damping, coulomb, payload = rng.uniform(0.0, [0.02, 0.4, 0.4, 3.0])
         world = Scenario(
-            f"random {seed}",
+            f"random-{seed}",
             armature=armature,
             damping=damping,
             coulomb=coulomb,
