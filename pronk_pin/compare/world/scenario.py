@@ -30,8 +30,9 @@ from ..._checks import (
 )
 from ..._checks import seed as known_seed
 from ...errors import InvalidInput, UnknownName
+from ...robot import ROTOR
 from ...storage import from_text
-from .mismatch import KNOWN, ROTOR
+from .mismatch import KNOWN
 from .sensors import Sensors
 
 Vector: TypeAlias = tuple[float, float, float]
