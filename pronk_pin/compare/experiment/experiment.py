@@ -30,7 +30,10 @@ from .initial_feedforward import initial_feedforward, learned_strides
 LEARNED = ("library", "identified")
 """Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
 
-DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
+DEFAULT_CONTROLLERS = (
+    *("pd", "ilc-paper", "ilc-stance", "ilc", "ilc+rotors"),
+    *("model", "model+rotors", "library"),
+)
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,24 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from ..metrics import CONFIDENCE, LEARNER, Interval, control_arm, family, in_family
+from ..metrics import (
+    CONFIDENCE,
+    LEARNER,
+    Interval,
+    compare_controllers,
+    control_arm,
+    family,
+    in_family,
+)
 from .inconclusive import inconclusive, unsaid
 from .overview import MOVING, ControllerOverview, Overview, answer, overview
-from .tables import SHOWN, beside_the_paper, sampled_scenarios, worst_reduction
+from .tables import (
+    SHOWN,
+    beside_the_paper,
+    paper_learner,
+    sampled_scenarios,
+    worst_reduction,
+)
 
 _WIDTH = 100
 
@@ -55,7 +69,8 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: Overview | None = No
         sentences.append(reason)
     elif "model" in table:
         sentences.append(_against_the_model(learning, table["model"]))
-    return _joined(*sentences, _fallen(table), _control_arm(summary))
+    sentences += _with_the_rotors(summary, scenario, table)
+    return _joined(*sentences, _growing(table), _fallen(table), _control_arm(summary))
 
 
 def _less(learning: ControllerOverview) -> str:
@@ -146,6 +161,44 @@ def _against_the_model(learning: ControllerOverview, model: ControllerOverview) 
     return text
 
 
+def _with_the_rotors(summary: pd.DataFrame, scenario: str, table: Overview) -> Iterator[str]:
+    """Practice against the model that knows the rotors, on the URDF's gait and on the model's."""
+    rival, said = "model+rotors", {True: "beats", None: "cannot be told from", False: "loses to"}
+    for learner, what in ((LEARNER, "Practice"), ("ilc+rotors", "On that model's gaits practice")):
+        if not {learner, rival} <= set(table):
+            continue
+        found = {
+            joint: compare_controllers(
+                summary, scenario=scenario, controller=learner, against=rival, joint=joint
+            )
+            for joint in SHOWN
+        }
+        parts = [
+            f"{said[found[joint].better]} it in the {joint} "
+            f"({number(table[learner].joints[joint].peak.value, '.4f')} against "
+            f"{number(table[rival].joints[joint].peak.value, '.4f')} rad)"
+            for joint in SHOWN
+            if found[joint].pairs
+        ]
+        if parts and what == "Practice":
+            yield (
+                "Against the model that knows the rotors, with gaits planned for them: practice "
+                f"{' and '.join(parts)}."
+            )
+        elif parts:
+            yield f"{what} {' and '.join(parts)}."
+
+
+def _growing(table: Overview) -> str:
+    """Whose errors grow while they learn; empty where nobody's do."""
+    found = [f"{row.diverging} under {name}" for name, row in table.items() if row.diverging]
+    return (
+        f"Robots whose errors grow again as they learn (diverging): {', '.join(found)}."
+        if (found)
+        else ""
+    )
+
+
 def _fallen(table: Overview) -> str:
     fallen, robots = sum(row.fell for row in table.values()), sum(r.robots for r in table.values())
     idle = robots - fallen - sum(row.upright for row in table.values())
@@ -194,7 +247,9 @@ def suite_verdict(summary: pd.DataFrame, *, tables: Mapping[str, Overview] | Non
         f"In {world} nothing is concluded: {reason}." for world, reason in reasons.items() if reason
     ]
     sentences += _range_against_pd(told)
-    return _joined(*sentences, _where_robots_fell(tables), _control_arm(summary))
+    growing = {scenario: _growing(table) for scenario, table in tables.items()}
+    grown = [f"In {scenario}: {text}" for scenario, text in growing.items() if text]
+    return _joined(*sentences, *grown, _where_robots_fell(tables), _control_arm(summary))
 
 
 def _where_it_beats_the_model(learning: Overview) -> Iterator[str]:
@@ -274,7 +329,9 @@ def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
     single = bool((summary["scenario"] == scenario).any())
     mine = tables[scenario]
     parts = [
-        _format_beside(beside_the_paper(summary, scenario=scenario)) if single else "",
+        _format_beside(beside_the_paper(summary, scenario=scenario), paper_learner(mine))
+        if single
+        else "",
         beside_note(mine) if single else "",
         format_overview(mine),
         textwrap.fill(answer_in_words(in_family(summary, scenario), tables=tables), _WIDTH),
@@ -284,7 +341,7 @@ def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
 
 def beside_note(table: Overview) -> str:
     """Who is missing beside the paper's Table I, from an `overview`; empty if nobody is."""
-    mine = [table[name] for name in ("pd", LEARNER) if name in table]
+    mine = [table[name] for name in ("pd", paper_learner(table)) if name in table]
     robots, missing = sum(row.robots for row in mine), sum(row.robots - row.upright for row in mine)
     if not missing:
         return ""
@@ -302,12 +359,12 @@ def format_suite(summary: pd.DataFrame) -> str:
     return "\n\n".join([*parts, textwrap.fill(answer_in_words(summary, tables=tables), _WIDTH)])
 
 
-def _format_beside(table: pd.DataFrame) -> str:
+def _format_beside(table: pd.DataFrame, learner: str) -> str:
     if table.empty:
         return ""
     lines = [
         " " * 8 + "".join(f"{f'{joint}: peak stance error [rad]':^44}" for joint in SHOWN),
-        f"{'speed':>6}  " + f"{'this run':^22}{'paper, Table I':^22}" * len(SHOWN),
+        f"{'speed':>6}  " + f"{f'this run, {learner}':^22}{'paper, Table I':^22}" * len(SHOWN),
         f"{'[m/s]':>6}" + f"{'PD':>8}{'ILC':>7}{'less':>7}" * 2 * len(SHOWN),
     ]
     for speed, row in table.iterrows():
@@ -341,6 +398,7 @@ def format_overview(table: Overview) -> str:
             f"{name:>{wide}}  {cells}  {against_model(row):>11}  {beat_text(row):>10}  "
             f"{number(row.feedback, '.0%'):>6}  {number(row.cost, '.2f'):>7}  "
             f"{row.upright} of {row.robots}"
+            + (f", {row.diverging} diverging" if row.diverging else "")
         )
     if units := units_of_intervals(table):
         lines.append(f"{'':>{wide}}  intervals over the {units}")

@@ -199,8 +199,20 @@ def _suite_figures(
             figures.heat_map(tables),
             "Mean peak stance error by scenario and controller, in milliradians.",
         ),
+        **_knowledge_figure(tables),
         **_learning_figures(results),
     }
+
+
+def _knowledge_figure(tables: Mapping[str, Overview]) -> dict[str, tuple[Figure, str]]:
+    """What a model must know to be as good as practice, with its caption."""
+    if not figures.shows_knowledge(tables):
+        return {}
+    caption = (
+        "Mean peak error from the contact on over what the model knows, scenario by scenario; "
+        "lines: practice, which knows nothing, and practice on gaits planned with the rotors."
+    )
+    return {"knowledge": (figures.knowledge_ladder(tables), caption)}
 
 
 def _learning_figures(results: Results) -> dict[str, tuple[Figure, str]]:
