@@ -19,7 +19,7 @@ from pronk_pin import Robot, cli
 from pronk_pin.cli.comparison import command_line
 from pronk_pin.compare import Experiment, Results, Schedule, random_scenarios, run_experiment
 from pronk_pin.compare.experiment.suites import SUITES, load_suite
-from pronk_pin.compare.metrics.statistics import family
+from pronk_pin.compare.metrics import family
 from pronk_pin.compare.report.limitations import limitations
 from pronk_pin.compare.results.manifest import Manifest
 from pronk_pin.errors import FileProblem
@@ -48,7 +48,7 @@ def test_the_report_answers_first_and_says_where_its_numbers_are_from(result: Re
     for anchor in ("scenarios", "nominal", "payload", "statistics", "limits", "provenance"):
         assert f'id="{anchor}"' in text
         assert f'href="#{anchor}"' in text
-    for known in ("mujoco 4", "BCa", "figure-heat-map", "figure-learning-calf"):
+    for known in ("mujoco 4", "t-intervals", "figure-heat-map", "figure-learning-calf"):
         assert known in text
     assert "nan" not in re.sub(r"data:image[^\"]*|provenance", "", text)
 
