@@ -16,6 +16,7 @@ from pronk_pin.control import (
     Gains,
     PDTypeILC,
     PhaseLog,
+    StrideRecord,
     Tape,
     ZeroPhaseFilter,
     load_controller,
@@ -393,3 +394,14 @@ def test_the_reason_why_a_stride_teaches_nothing_is_told(
     learn(controller, stances(0.1), upright=np.array([False, True]))
     assert [SKIPPED[code] for code in controller.skipped] == ["fallen", "not finite"]
     np.testing.assert_array_equal(controller.feedforward, 0.0)
+
+
+def test_a_share_of_what_lies_beyond_is_shown() -> None:
+    """Half of it: between the last error, which is held, and what follows."""
+    error = np.zeros((1, SAMPLES, 12))
+    own = StrideRecord.of(error + 0.2, error, error, error)
+    following = StrideRecord.of(error + 0.6, error + 1.0, error, error)
+    half = own.onward(following, np.array([1.0]), 0.5)
+    np.testing.assert_allclose(half.error_onward, 0.4)
+    np.testing.assert_allclose(half.rate_onward, 0.5)
+    np.testing.assert_allclose(own.onward(following, np.array([1.0])).error_onward, 0.6)

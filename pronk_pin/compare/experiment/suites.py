@@ -29,7 +29,10 @@ SUITES: Mapping[str, Mapping[str, Any]] = {
         "scenarios": tuple("+".join(pair) for pair in itertools.combinations(MISMATCHES, 2)),
         "schedule": Schedule(baseline=4.0, learning=60.0),
     },
-    "mismatch": {"scenarios": MISMATCHES},
+    "mismatch": {
+        "controllers": ("pd", "ilc", "ilc+rotors", "model", "model+rotors"),
+        "scenarios": MISMATCHES,
+    },
     "sampled": {
         "speeds": _FOUR_SPEEDS,
         "controllers": ("pd", "model", "ilc"),
