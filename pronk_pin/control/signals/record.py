@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,10 +107,23 @@ class StrideRecord:
     @classmethod
     def unknown(cls, n: int) -> StrideRecord:
         """Make the record of n robots that have made no stride yet: NaN."""
-        shapes = [(n, SAMPLES, NL)] * 5 + [(n,), (n, NL)] + [(n, ONWARD, NL)] * 2
-        names = [item.name for item in fields(cls)]
-        unknown = {name: np.full(shape, np.nan) for name, shape in zip(names, shapes, strict=False)}
-        return cls(**unknown, upright=np.ones(n, dtype=bool), robot=np.arange(n))
+
+        def unknown(*shape: int) -> Array:
+            return np.full((n, *shape), np.nan)
+
+        return cls(
+            error=unknown(SAMPLES, NL),
+            error_rate=unknown(SAMPLES, NL),
+            feedback=unknown(SAMPLES, NL),
+            feedforward=unknown(SAMPLES, NL),
+            missing=unknown(SAMPLES, NL),
+            relative_duration=unknown(),
+            contact_error=unknown(NL),
+            error_onward=unknown(ONWARD, NL),
+            rate_onward=unknown(ONWARD, NL),
+            upright=np.ones(n, dtype=bool),
+            robot=np.arange(n),
+        )
 
     @classmethod
     def of(
@@ -174,12 +187,33 @@ class StrideRecord:
 
     def take(self, rows: IntArray) -> StrideRecord:
         """The record of some of the robots, copied."""
-        return replace(self, **{item.name: getattr(self, item.name)[rows] for item in fields(self)})
+        return StrideRecord(
+            error=self.error[rows],
+            error_rate=self.error_rate[rows],
+            feedback=self.feedback[rows],
+            feedforward=self.feedforward[rows],
+            missing=self.missing[rows],
+            relative_duration=self.relative_duration[rows],
+            contact_error=self.contact_error[rows],
+            error_onward=self.error_onward[rows],
+            rate_onward=self.rate_onward[rows],
+            upright=self.upright[rows],
+            robot=self.robot[rows],
+        )
 
     def put(self, rows: IntArray, other: StrideRecord) -> None:
         """Overwrite the record of some robots by that of others."""
-        for item in fields(self):
-            getattr(self, item.name)[rows] = getattr(other, item.name)
+        self.error[rows] = other.error
+        self.error_rate[rows] = other.error_rate
+        self.feedback[rows] = other.feedback
+        self.feedforward[rows] = other.feedforward
+        self.missing[rows] = other.missing
+        self.relative_duration[rows] = other.relative_duration
+        self.contact_error[rows] = other.contact_error
+        self.error_onward[rows] = other.error_onward
+        self.rate_onward[rows] = other.rate_onward
+        self.upright[rows] = other.upright
+        self.robot[rows] = other.robot
 
 
 def held(values: Array) -> Array:
