@@ -17,8 +17,16 @@ from ..gait import Gait, known_gaits
 from ..kinematics import rotate_leg
 from ..robot import BASES, NL, Robot, as_array, as_numbers
 from .controller_spec import ControllerSpec
-from .feedback import Balance, SpeedEstimator
-from .learning import SKIPPED, ModelBasedILC, anti_windup, delivered, learned_by, symmetric
+from .feedback import SpeedEstimator
+from .learning import (
+    SKIPPED,
+    LawContext,
+    anti_windup,
+    bound,
+    delivered,
+    learned_by,
+    symmetric,
+)
 from .prediction import StrideSettings, lifted_model
 from .signals import (
     PARTS,
@@ -27,7 +35,6 @@ from .signals import (
     Reference,
     StrideRecord,
     Tape,
-    ZeroPhaseFilter,
     held,
     phase_grid,
     resample,
@@ -70,71 +77,49 @@ class Controller:
         flight: Array | None = None,
         base: str = "locked",
     ) -> None:
-        gaits = known_gaits(robot, gaits)
-        instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
-        timestep = real("timestep", timestep, TIMESTEP)
+        gaits, timestep = _known_setting(robot, gaits, spec, timestep, base)
         n = len(gaits)
-        known_name("base", base, BASES)
-        shape = (n, len(PARTS), SAMPLES, NL)
-        feedforward = (
-            np.zeros(shape) if feedforward is None else as_numbers("feedforward", feedforward)
+        self.feedforward, duration = _known_start(n, feedforward, flight)
+        self.robot, self.spec, self.gaits = robot, spec, gaits
+        self._timestep, self._base = timestep, base
+        self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
+        self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
+        self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
+        if duration is not None:
+            self._flight.stretch(np.arange(n), duration)
+        self._always_retimes = duration is None and spec.law is None and spec.flight_law is None
+        self._laws = (bound(spec.law, self._context(0)), bound(spec.flight_law, self._context(1)))
+        self.balance = spec.balance.bind(
+            robot, gaits, base=base, gains=spec.gains, ticks=self.max_ticks, timestep=timestep
         )
-        if flight is not None:
-            flight = as_array("flight", flight, n, ())
-        if feedforward.shape != shape:
-            raise InvalidInput(
-                f"a feedforward of shape {feedforward.shape}; expected {shape}: "
-                "torques on the phase grids of stance and flight for each gait"
-            )
-        if not np.isfinite(feedforward).all():
-            raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
-        self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
-        self.feedforward = feedforward.copy()
-        self._timestep = timestep
-        self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
-        self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
-        self._tilt = np.zeros((n, len(PARTS)))
-        self._stance_verdict = np.zeros(
-            n, dtype=np.intp
-        )  # why a stance was none, index into `SKIPPED`
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
-        self._laws = list(spec.laws)
-        self._base = base
-        for law in self._laws:
-            learning_filter = getattr(law, "filter", None)
-            if isinstance(learning_filter, ZeroPhaseFilter):
-                learning_filter.warn()
-        if base != "locked" and isinstance(spec.law, ModelBasedILC):
-            raise InvalidInput(
-                f"controller '{spec.name}' has a law with a model that counts on a level trunk; "
-                "use another controller, or base 'locked'"
-            )
-        if isinstance(spec.law, ModelBasedILC):
-            settings = StrideSettings(
-                spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
-            )
-            self._laws[0] = spec.law.bind([lifted_model(robot, gait, settings) for gait in gaits])
-        self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
-        self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
-        self.balance = None
-        if base != "locked":
-            self.balance = Balance(
-                robot,
-                gaits,
-                spec.balance,
-                gains=spec.gains,
-                ticks=self.max_ticks,
-                timestep=timestep,
-            )
-        self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
-        if flight is not None:
-            self._flight.stretch(np.arange(n), flight)
-        self._always_retimes = flight is None and not any(self._laws)
         end = np.array([1.0])
         self._lift_off_speed = np.array(
             [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
+        )
+        self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
+        self._tilt = np.zeros((n, len(PARTS)))
+        # Reasons why strides and stances are none to learn from, indices into `SKIPPED`.
+        self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
+        self._stance_verdict = np.zeros(n, dtype=np.intp)
+
+    def _context(self, part: int) -> LawContext:
+        """Context of the law of one part of the stride."""
+        spec = self.spec
+        settings = StrideSettings(
+            spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, self._timestep
+        )
+        return LawContext(
+            controller=spec.name,
+            part=PARTS[part],
+            robot=self.robot,
+            gaits=self.gaits,
+            base=self._base,
+            gains=spec.gains,
+            timestep=self._timestep,
+            lifted_models=lambda: [lifted_model(self.robot, gait, settings) for gait in self.gaits],
         )
 
     @property
@@ -314,3 +299,37 @@ class Controller:
                 flight.duration[rows], self._flight_measured[rows], flight.planned[rows]
             )
             flight.stretch(rows, following)
+
+
+def _known_setting(
+    robot: Robot, gaits: Sequence[Gait], spec: ControllerSpec, timestep: float, base: str
+) -> tuple[tuple[Gait, ...], float]:
+    """The gaits and the timestep of a controller, checked with all that it is made for."""
+    gaits = known_gaits(robot, gaits)
+    instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
+    timestep = real("timestep", timestep, TIMESTEP)
+    known_name("base", base, BASES)
+    return gaits, timestep
+
+
+def _known_start(
+    n: int, feedforward: Array | None, flight: Array | None
+) -> tuple[Array, Array | None]:
+    """The feedforward (n, 2, samples, 12) and the flights' durations (n,) of the start, checked.
+
+    The feedforward is a copy, zero by default; without durations it is None.
+    """
+    shape = (n, len(PARTS), SAMPLES, NL)
+    if flight is not None:
+        flight = as_array("flight", flight, n, ())
+    if feedforward is None:
+        return np.zeros(shape), flight
+    feedforward = as_numbers("feedforward", feedforward)
+    if feedforward.shape != shape:
+        raise InvalidInput(
+            f"a feedforward of shape {feedforward.shape}; expected {shape}: "
+            "torques on the phase grids of stance and flight for each gait"
+        )
+    if not np.isfinite(feedforward).all():
+        raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
+    return feedforward.copy(), flight

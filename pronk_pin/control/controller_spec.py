@@ -16,6 +16,7 @@ from .._checks import (
 )
 from .feedback import SPEED_FILTER, AttitudeFilter, BalanceSpec, LegAngleRegulator
 from .learning import (
+    FLIGHT_LAW,
     CurrentIterationILC,
     LearningLaw,
     NormOptimalILC,
@@ -101,16 +102,6 @@ class ControllerSpec:
         """The learning laws, in the order of `PARTS`."""
         return self.law, self.flight_law
 
-
-FLIGHT_LAW = PDTypeILC(
-    gain=0.8,
-    leak=0.02,
-    delta=0.08,
-    # The error's rate would learn the vibration of the leg after lift-off.
-    gains=Gains(kd=(0.0, 0.0, 0.0)),
-    filter=ZeroPhaseFilter.butterworth(3, 0.04),
-)
-"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
 
 _ILC = ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming())
 """Learning from nothing, over the whole stride."""

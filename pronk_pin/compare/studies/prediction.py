@@ -163,7 +163,7 @@ def compare_prediction(
     rotors = Rotors(scenario.armature, scenario.damping)
     model = lifted_model(robot, gait, settings, rotors=rotors)
     if isinstance(law, ModelBasedILC):
-        law = law.bind([lifted_model(robot, gait, settings)])
+        law = law.with_models([lifted_model(robot, gait, settings)])
     of_speed = strides.sel(speed=speed, method="nearest").sel(part="stance")
     count = int(of_speed["count"])
     first = int(np.argmax(of_speed["learning"].to_numpy()[:count] == 1))

@@ -58,6 +58,21 @@ class BalanceSpec:
         keep_instances(self, "balance: ", attitude=AttitudeRegulator, placement=FootPlacement)
         keep_reals(self, {"learned": SHARE, "landing": SHARE}, "balance: ")
 
+    def bind(
+        self,
+        robot: Robot,
+        gaits: Sequence[Gait],
+        *,
+        base: str,
+        gains: Gains,
+        ticks: int,
+        timestep: float,
+    ) -> Balance | None:
+        """Make the balance of n robots: see `Balance`; None where the base is locked."""
+        if base == "locked":
+            return None
+        return Balance(robot, gaits, self, gains=gains, ticks=ticks, timestep=timestep)
+
 
 _TICKS = Interval(1, 10_000_000)
 
@@ -94,12 +109,12 @@ class Balance:
         ticks, timestep = whole("ticks", ticks, _TICKS), real("timestep", timestep, POSITIVE)
         self._spec, self._gains, self._radius = spec, gains, robot.foot_radius
         self._geometry = leg_geometry(robot)
-        duration = np.array([[getattr(g, part).duration for part in PARTS] for g in gaits])
+        duration = np.array([[gait.phase(part).duration for part in PARTS] for gait in gaits])
         self._s = np.minimum(np.arange(ticks) * timestep / duration[..., None], 1.0)
         pitch, rate = np.zeros((2, len(gaits), len(PARTS), ticks))
         for k, gait in enumerate(gaits):
             for p, part in enumerate(PARTS):
-                base, speed = getattr(gait, part).base_reference(self._s[k, p])
+                base, speed = gait.phase(part).base_reference(self._s[k, p])
                 pitch[k, p] = base[:, 2]
                 rate[k, p] = np.where(self._s[k, p] < 1.0, speed[:, 2], 0.0)
         self._reference, self._rate = pitched(pitch), rate

@@ -5,13 +5,16 @@ Goes out: the next stride's feedforward, and torque libraries of what was learne
 """
 
 from .laws import (
+    FLIGHT_LAW,
     SKIPPED,
     CurrentIterationILC,
+    LawContext,
     LearningLaw,
     PaperILC,
     PDTypeILC,
     StrideSelection,
     anti_windup,
+    bound,
     delivered,
     known_law,
     learned_by,
@@ -22,9 +25,11 @@ from .symmetry import symmetric
 from .torque_library import InitialFeedforward, TorqueLibrary
 
 __all__ = [
+    "FLIGHT_LAW",
     "SKIPPED",
     "CurrentIterationILC",
     "InitialFeedforward",
+    "LawContext",
     "LearningLaw",
     "LiftedModel",
     "ModelBasedILC",
@@ -35,6 +40,7 @@ __all__ = [
     "StrideSelection",
     "TorqueLibrary",
     "anti_windup",
+    "bound",
     "delivered",
     "known_law",
     "learned_by",

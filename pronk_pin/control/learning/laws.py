@@ -5,16 +5,19 @@ A law is a function with parameters and no state: what was learned so far is in 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from ..._checks import SHARE, Interval, instance_of, keep_reals, shown
 from ..._typing import Array, BoolArray, IntArray
 from ...errors import InvalidInput
+from ...gait import Gait
+from ...robot import Robot
 from ..signals import PAPER_A, PAPER_B, Gains, StrideRecord, ZeroPhaseFilter, look_ahead
+from .lifted import LiftedModel
 
 
 class LearningLaw(Protocol):
@@ -22,6 +25,44 @@ class LearningLaw(Protocol):
 
     def update(self, record: StrideRecord) -> Array:
         """Compute the next stride's feedforward on the phase grid [N m], shape (n, samples, 12)."""
+        ...
+
+
+@dataclass(frozen=True)
+class LawContext:
+    """Context in which a controller's law is going to learn, known before the first stride.
+
+    Attributes:
+        controller: Name of the controller.
+        part: Part of the stride that the law learns, one of `PARTS`.
+        robot: The robot.
+        gaits: The gait of each of the n robots, in the order of `StrideRecord.robot`.
+        base: How the trunks may move, one of `BASES`.
+        gains: Feedback gains.
+        timestep: Time step of the control [s].
+        lifted_models: Computes the model of each robot's stance under this controller: seconds.
+    """
+
+    controller: str
+    part: str
+    robot: Robot
+    gaits: Sequence[Gait]
+    base: str
+    gains: Gains
+    timestep: float
+    lifted_models: Callable[[], Sequence[LiftedModel]]
+
+
+@runtime_checkable
+class BindableLaw(LearningLaw, Protocol):
+    """A learning law that wants to know where it is going to learn, or refuses to."""
+
+    def bind(self, context: LawContext) -> LearningLaw:
+        """The law as a controller uses it; called once, before the first stride.
+
+        Raises:
+            InvalidInput: It cannot learn there.
+        """
         ...
 
 
@@ -112,15 +153,23 @@ _GAIN = Interval(0, 2, below=True)
 _DELTA = Interval(0, 1, below=True)
 
 
-def _check_parts(law: str, owner: PDTypeILC | PaperILC | CurrentIterationILC) -> None:
-    """The gains and the filter of a law."""
-    if not isinstance(owner, CurrentIterationILC):
-        instance_of(f"{law}: gains", owner.gains, Gains)
-    if not callable(owner.filter):
-        raise InvalidInput(
-            f"{law}: filter={shown(owner.filter)} is no filter; give a ZeroPhaseFilter, or a "
-            "function of an array (n, samples, 12)"
-        )
+class _FilteredILC(LearningLaw, Protocol):
+    """What laws have in common that pass what they learned through a filter Q."""
+
+    filter: ZeroPhaseFilter
+
+    def bind(self, context: LawContext) -> LearningLaw:
+        """The law itself, with a warning if its filter loses torque: see `ZeroPhaseFilter.warn`."""
+        if isinstance(self.filter, ZeroPhaseFilter):  # any function will do
+            self.filter.warn()
+        return self
+
+    def _check_filter(self, law: str) -> None:
+        if not callable(self.filter):
+            raise InvalidInput(
+                f"{law}: filter={shown(self.filter)} is no filter; give a ZeroPhaseFilter, or a "
+                "function of an array (n, samples, 12)"
+            )
 
 
 def known_law(name: str, law: object) -> LearningLaw | None:
@@ -129,14 +178,35 @@ def known_law(name: str, law: object) -> LearningLaw | None:
     Raises:
         InvalidInput: It is neither.
     """
-    # Dictionaries and sets have an `update` too.
-    other = isinstance(law, type | Mapping | set) or not callable(getattr(law, "update", None))
-    if law is not None and other:
+    if law is not None and not _is_law(law):
         raise InvalidInput(
             f"{name}={shown(law)} is no learning law; give an object with update(record), such as "
             "PDTypeILC(), or None"
         )
     return law  # type: ignore[return-value]
+
+
+def _is_law(law: object) -> bool:
+    # Dictionaries and sets have an `update` too.
+    return not isinstance(law, type | Mapping | set) and callable(getattr(law, "update", None))
+
+
+def bound(law: LearningLaw | None, context: LawContext) -> LearningLaw | None:
+    """A law, or None, as a controller uses it: bound to the context if it has a `bind`.
+
+    Raises:
+        InvalidInput: It cannot learn there, or its `bind` answers no law.
+    """
+    if not isinstance(law, BindableLaw):
+        return law
+    ready = law.bind(context)
+    if not _is_law(ready):
+        raise InvalidInput(
+            f"the law {type(law).__name__} of controller '{context.controller}' answered "
+            f"{shown(ready)} to bind(context); let it return an object with update(record), such "
+            "as itself"
+        )
+    return ready
 
 
 def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array:
@@ -163,7 +233,7 @@ def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array
 
 
 @dataclass(frozen=True)
-class PDTypeILC:
+class PDTypeILC(_FilteredILC):
     """PD-type ILC on a memory that holds the feedforward only, with forgetting.
 
     `ff <- Q[(1 - leak) ff + gain (Kp e + Kd e')(s + delta)]`
@@ -174,7 +244,8 @@ class PDTypeILC:
     Attributes:
         gain: Learning gain; 0 to 1.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase; what the feedforward does takes a while to show in the error.
+        delta: Look-ahead, as a part of the phase s from 0 to 1: how much later the error is read,
+            since what a feedforward does takes a while to show in it.
         gains: Weights of the error and its rate: eq. (10).
         filter: The learning filter Q.
     """
@@ -187,7 +258,8 @@ class PDTypeILC:
 
     def __post_init__(self) -> None:
         keep_reals(self, {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}, "a PD-type law: ")
-        _check_parts("a PD-type law", self)
+        instance_of("a PD-type law: gains", self.gains, Gains)
+        self._check_filter("a PD-type law")
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -195,8 +267,19 @@ class PDTypeILC:
         return self.filter((1.0 - self.leak) * record.feedforward + self.gain * correction)
 
 
+FLIGHT_LAW = PDTypeILC(
+    gain=0.8,
+    leak=0.02,
+    delta=0.08,
+    # The error's rate would learn the vibration of the leg after lift-off.
+    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    filter=ZeroPhaseFilter.butterworth(3, 0.04),
+)
+"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
+
+
 @dataclass(frozen=True)
-class PaperILC:
+class PaperILC(_FilteredILC):
     """The paper's law: eq. (10), on the recorded total torque, with the printed filter.
 
     `ff <- Q[tau + (Kp e + Kd e')(s + delta)]` with `tau = ff + tau_b`, the recorded torque.
@@ -205,7 +288,7 @@ class PaperILC:
     is 2; only the filter's leak keeps the law from diverging.
 
     Attributes:
-        delta: Look-ahead in phase.
+        delta: Look-ahead, as a part of the phase s from 0 to 1, into the error.
         gains: Feedforward gains, in the paper equal to the feedback gains.
         filter: Zero-phase filter over recorded torques and errors.
     """
@@ -216,7 +299,8 @@ class PaperILC:
 
     def __post_init__(self) -> None:
         keep_reals(self, {"delta": _DELTA}, "the paper's law: ")
-        _check_parts("the paper's law", self)
+        instance_of("the paper's law: gains", self.gains, Gains)
+        self._check_filter("the paper's law")
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -225,7 +309,7 @@ class PaperILC:
 
 
 @dataclass(frozen=True)
-class CurrentIterationILC:
+class CurrentIterationILC(_FilteredILC):
     """Current-iteration law: the feedback that acted in the stride becomes memory.
 
     `ff <- Q[(1 - leak) ff + gain tau_b(s + delta)]`
@@ -237,7 +321,7 @@ class CurrentIterationILC:
     Attributes:
         gain: Part of the feedback torque that is taken over; 1 in the textbook.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase.
+        delta: Look-ahead, as a part of the phase s from 0 to 1, into the feedback.
         filter: The learning filter Q.
     """
 
@@ -249,7 +333,7 @@ class CurrentIterationILC:
     def __post_init__(self) -> None:
         checks = {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}
         keep_reals(self, checks, "a current-iteration law: ")
-        _check_parts("a current-iteration law", self)
+        self._check_filter("a current-iteration law")
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""

@@ -20,6 +20,7 @@ from ..._checks import SHARE, Interval, keep_reals, none_or, whole
 from ..._typing import Array
 from ...errors import InvalidInput
 from ..signals import StrideRecord
+from .laws import LawContext
 from .lifted import LiftedModel
 
 SPLINES = 12
@@ -64,12 +65,12 @@ def spline_basis(samples: int, splines: int) -> Array:
 
 @dataclass(frozen=True)
 class ModelBasedILC:
-    """A learning law that needs the lifted model of each robot's gait, which `bind` binds.
+    """A learning law of the stance that needs the lifted model of each robot's gait.
 
     Attributes:
         splines: B-splines a joint that make up the feedforward; None for one a sample.
         horizon: Number of strides ahead whose responses to a change are weighed.
-        responses: The models' responses, one for each robot; empty until `bind`.
+        responses: The models' responses, one for each robot; empty until `bind` or `with_models`.
     """
 
     splines: int | None = field(default=SPLINES, kw_only=True)
@@ -83,8 +84,26 @@ class ModelBasedILC:
         whole(f"{prefix}horizon", self.horizon, Interval(1, 100))
         none_or(whole, f"{prefix}splines", self.splines, Interval(_DEGREE + 1, 1000))
 
-    def bind(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
-        """Bind the law to models of the robots, in the order of `StrideRecord.robot`."""
+    def bind(self, context: LawContext) -> ModelBasedILC:
+        """The law with the models of a controller's stances.
+
+        Raises:
+            InvalidInput: The models do not hold there: the base is not locked, or it is the flight.
+        """
+        if context.base != "locked":
+            raise InvalidInput(
+                f"controller '{context.controller}' has a law with a model that counts on a level "
+                "trunk; use another controller, or base 'locked'"
+            )
+        if context.part != "stance":
+            raise InvalidInput(
+                f"controller '{context.controller}' has a law with a model of the stance as that "
+                f"of the {context.part}; use another one, such as FLIGHT_LAW, or None"
+            )
+        return self.with_models(context.lifted_models())
+
+    def with_models(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
+        """The law with models of the robots, in the order of `StrideRecord.robot`."""
         responses = tuple(
             ErrorResponse.of(model, splines=self.splines, horizon=self.horizon) for model in models
         )
@@ -97,7 +116,7 @@ class ModelBasedILC:
             if robot >= len(self.responses):
                 raise InvalidInput(
                     f"{type(self).__name__} knows the models of {len(self.responses)} robots and "
-                    f"is asked for robot {robot}; give it theirs by `bind(models)`"
+                    f"is asked for robot {robot}; give it theirs by `with_models(models)`"
                 )
             rows = np.flatnonzero(record.robot == robot)
             errors = record.error[rows].reshape(len(rows), -1)
@@ -139,9 +158,9 @@ class PlantInversionILC(ModelBasedILC):
         }
         keep_reals(self, checks, "plant inversion: ")
 
-    def bind(self, models: Sequence[LiftedModel]) -> PlantInversionILC:
-        """See `ModelBasedILC.bind`."""
-        bound = super().bind(models)
+    def with_models(self, models: Sequence[LiftedModel]) -> PlantInversionILC:
+        """See `ModelBasedILC.with_models`."""
+        bound = super().with_models(models)
         inverses = tuple(
             np.linalg.pinv(response.strides.mean(axis=0), rcond=self.cutoff)
             for response in bound.responses
@@ -183,9 +202,9 @@ class NormOptimalILC(ModelBasedILC):
                 f"got change={self.change:g}, effort={self.effort:g}"
             )
 
-    def bind(self, models: Sequence[LiftedModel]) -> NormOptimalILC:
-        """See `ModelBasedILC.bind`."""
-        bound, steps = super().bind(models), []
+    def with_models(self, models: Sequence[LiftedModel]) -> NormOptimalILC:
+        """See `ModelBasedILC.with_models`."""
+        bound, steps = super().with_models(models), []
         for response in bound.responses:
             square = np.mean([G.T @ G for G in response.strides], axis=0)
             inverse = np.linalg.inv(square + (self.change + self.effort) * np.eye(len(square)))

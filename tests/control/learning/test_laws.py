@@ -120,7 +120,7 @@ def toy(rng: np.random.Generator) -> LiftedModel:
 def errors(law: ModelBasedILC, model: LiftedModel, strides: int) -> Array:
     """Norms of the error of the toy's strides, the first without feedforward."""
     begin = record = model.planned
-    bound, norms = law.bind([model]), [np.linalg.norm(begin.error)]
+    bound, norms = law.with_models([model]), [np.linalg.norm(begin.error)]
     for _ in range(strides):
         record = model.stride(bound.update(record), begin, np.zeros((1, 0)))
         norms.append(np.linalg.norm(record.error))
@@ -135,7 +135,7 @@ def test_plant_inversion_needs_one_stride_where_the_model_is_right() -> None:
 
 def test_plant_inversion_diverges_where_the_plant_is_more_than_twice_the_model() -> None:
     model = toy(np.random.default_rng(0))
-    law = PlantInversionILC(gain=1.0, cutoff=1e-6, splines=None, horizon=1).bind([model])
+    law = PlantInversionILC(gain=1.0, cutoff=1e-6, splines=None, horizon=1).with_models([model])
     for factor, grows in ((1.9, False), (2.1, True)):
         plant = model.scaled(factor)
         begin = plant.planned
@@ -156,14 +156,14 @@ def test_the_norm_optimal_law_converges_monotonically() -> None:
 def test_the_norm_optimal_law_minimises_what_it_says() -> None:
     model, change, effort = toy(np.random.default_rng(2)), 0.3, 0.2
     begin = model.planned
-    law = NormOptimalILC(change=change, effort=effort, splines=None, horizon=1).bind([model])
+    law = NormOptimalILC(change=change, effort=effort, splines=None, horizon=1).with_models([model])
     u = law.update(begin).reshape(-1)
     gradient = -model.angle.T @ (begin.error.reshape(-1) - model.angle @ u) + (change + effort) * u
     np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
 
 
 def test_a_model_based_law_without_its_models_says_what_to_do() -> None:
-    with pytest.raises(InvalidInput, match=r"give it theirs by `bind\(models\)`"):
+    with pytest.raises(InvalidInput, match=r"give it theirs by `with_models\(models\)`"):
         NormOptimalILC().update(toy(np.random.default_rng(0)).planned)
 
 
@@ -195,7 +195,7 @@ def test_only_a_law_that_looks_ahead_is_stable_where_the_touchdown_outdoes_the_s
     model = carried(np.random.default_rng(4))
     begin, left = model.planned, {}
     for horizon in (1, 4):
-        law = NormOptimalILC(change=0.01, splines=None, horizon=horizon).bind([model])
+        law = NormOptimalILC(change=0.01, splines=None, horizon=horizon).with_models([model])
         record, state = begin, np.zeros((1, TOY))
         for _ in range(20):
             learned = law.update(record)
@@ -212,7 +212,7 @@ def test_a_feedforward_of_splines_has_no_chatter() -> None:
     model = LiftedModel.with_resets(
         answer, np.zeros_like(answer), gains=Gains(), torque=rng.normal(size=(SAMPLES, 3))
     )
-    learned = NormOptimalILC().bind([model]).update(model.planned)[0, :, 0]
+    learned = NormOptimalILC().with_models([model]).update(model.planned)[0, :, 0]
     power = np.abs(np.fft.rfft(learned)) ** 2
     assert power[16:].sum() < 0.01 * power.sum()
 

@@ -40,7 +40,7 @@ def toy() -> Model:
 
 def test_powers_of_the_operator_are_what_the_strides_do() -> None:
     model = toy()
-    law = NormOptimalILC(change=1.0, effort=0.1, splines=None).bind([model])
+    law = NormOptimalILC(change=1.0, effort=0.1, splines=None).with_models([model])
     operator = iteration(law, model, np.eye(3 * SAMPLES))
     none = model.record(*np.zeros((3, 3 * SAMPLES)))
     u = np.random.default_rng(1).normal(size=(1, SAMPLES, 3))
@@ -55,7 +55,7 @@ def test_powers_of_the_operator_are_what_the_strides_do() -> None:
 
 def test_the_limit_is_where_many_strides_end() -> None:
     model = toy()
-    law = NormOptimalILC(change=1.0, effort=0.1, splines=None).bind([model])
+    law = NormOptimalILC(change=1.0, effort=0.1, splines=None).with_models([model])
     found = analyze(law, model)
     assert found.radius < 1.0
     last = predict(law, model, model.planned, 300)[-1]
@@ -65,7 +65,7 @@ def test_the_limit_is_where_many_strides_end() -> None:
 
 def test_the_radius_of_plant_inversion_is_known_by_hand() -> None:
     model = toy().within_a_stride
-    law = PlantInversionILC(gain=0.3, cutoff=1e-6, splines=None, horizon=1).bind([model])
+    law = PlantInversionILC(gain=0.3, cutoff=1e-6, splines=None, horizon=1).with_models([model])
     found = analyze(law, model)
     assert found.stride_radius == pytest.approx(0.7)
     assert found.with_gain_error[1.3] == pytest.approx(1.0 - 0.3 * 1.3)
