@@ -12,7 +12,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from .._checks import instance_of, none_or, real, sequence_of
+from .._checks import instance_of, real, sequence_of
 from .._checks import path as known_path
 from .._typing import Array
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange
@@ -73,7 +73,8 @@ class GaitLibrary:
             raise InvalidInput(
                 f"{len(self.audit)} audits for {len(self.gaits)} gaits; give each one"
             )
-        for gait, found in zip(self.gaits, self.audit, strict=bool(self.audit)):
+        for index, found in enumerate(self.audit):
+            gait = self.gaits[index]
             if gait.sha256 != found.motion:
                 raise InvalidInput(
                     f"the gait at {gait.speed:g} m/s is not the one that was audited; "
@@ -117,8 +118,7 @@ class GaitLibrary:
         Raises:
             InvalidInput: There is no such gait; the error lists the grid.
         """
-        apex = none_or(real, "apex", apex)
-        row = _index(self.apexes, self.apex if apex is None else apex, "apex")
+        row = self._row(apex)
         return row * len(self.speeds) + _index(self.speeds, real("speed", speed), "speed")
 
     def at_apex(self, apex: float | None = None) -> GaitLibrary:
@@ -127,13 +127,16 @@ class GaitLibrary:
         Raises:
             InvalidInput: There is no such apex; the error lists the grid.
         """
-        height = self.apex if apex is None else real("apex", apex)
-        n, row = len(self.speeds), _index(self.apexes, height, "apex")
+        n, row = len(self.speeds), self._row(apex)
         part = slice(row * n, (row + 1) * n)
         metadata = {
             key: value[part] if key in PER_GAIT else value for key, value in self.metadata.items()
         }
         return GaitLibrary(self.gaits[part], metadata, self.audit[part])
+
+    def _row(self, apex: float | None) -> int:
+        """Index in `apexes` of an apex of the grid; by default the library's own."""
+        return _index(self.apexes, self.apex if apex is None else real("apex", apex), "apex")
 
     def at(self, speed: float, apex: float | None = None) -> Gait:
         """The gait at a speed [m/s] and apex [m], interpolated in both: eq. (13).
@@ -251,12 +254,11 @@ def from_arrays(arrays: StoredArrays) -> GaitLibrary:
     audits = arrays.as_type(arrays.document("audit"), list[StoredAudit])
     try:
         gaits = _gaits(arrays, metadata["robot"])
-        found = tuple(
-            Audit.from_stored(gait.speed, stored)
-            for gait, stored in zip(gaits, audits, strict=False)  # their number is checked below
-        )
-        if len(found) != len(audits):
+        if len(audits) > len(gaits):
             raise arrays.damaged(f"{len(audits)} audits for {len(gaits)} gaits")
+        found = tuple(
+            Audit.from_stored(gaits[index].speed, stored) for index, stored in enumerate(audits)
+        )
         return GaitLibrary(gaits, metadata, found, float(arrays.numbers("default_apex")))
     except InvalidInput as error:
         raise arrays.damaged(error) from error

@@ -243,6 +243,7 @@ def _check_sequence(sequence: tuple[ContactPhase, ...]) -> None:
     for pair in PAIRS:
         if not any(pair in phase.stands for phase in sequence):
             raise InvalidInput(f"the {pair} legs never stand; add them to a phase")
-    for before, phase in zip((sequence[-1], *sequence), sequence, strict=False):
+    for index, phase in enumerate(sequence):
+        before = sequence[index - 1]  # the last one comes before the first
         if before.stands == phase.stands:
             raise InvalidInput(f"{before.name} and {phase.name} have the same feet; merge them")
