@@ -114,10 +114,6 @@ class _Reader:
             return "fixed to the world"
         return f"held by {', '.join(map(self._name, self.base_joints))}"
 
-    @property
-    def trunk_body(self) -> str:
-        return str(self.model.body(self.root).name)
-
     def _name(self, joint: int) -> str:
         body = self.model.body(self.model.jnt_bodyid[joint]).name
         return self.model.joint(joint).name or f"(joint of {body or 'a body'} without a name)"

@@ -12,7 +12,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from ..._checks import SHARE, Interval, instance_of, keep_reals, shown
-from ..._typing import Array, BoolArray, IntArray
+from ..._typing import Array, IntArray
 from ...errors import InvalidInput
 from ...gait import Gait
 from ...robot import Robot
@@ -109,10 +109,6 @@ class StrideSelection:
             np.isnan(duration),
         ]
         return np.asarray(np.select(checks, range(1, len(checks) + 1), default=0), dtype=np.intp)
-
-    def usable(self, record: StrideRecord) -> BoolArray:
-        """Whether strides may be learned from, shape (n,)."""
-        return np.asarray(self.skipped(record) == 0)
 
 
 def delivered(record: StrideRecord) -> StrideRecord:
