@@ -98,7 +98,7 @@ class ModelBasedILC:
         if context.part != "stance":
             raise InvalidInput(
                 f"controller '{context.controller}' has a law with a model of the stance as that "
-                f"of the {context.part}; use another one, such as FLIGHT_LAW, or None"
+                f"of the {context.part}; use another one, such as PDTypeILC(), or None"
             )
         return self.with_models(context.lifted_models())
 
