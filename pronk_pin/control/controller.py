@@ -18,16 +18,7 @@ from ..kinematics import rotate_leg
 from ..robot import BASES, NL, Robot, as_array, as_numbers
 from .controller_spec import ControllerSpec
 from .feedback import SpeedEstimator
-from .learning import (
-    SKIPPED,
-    LawContext,
-    anti_windup,
-    bound,
-    delivered,
-    learned_by,
-    symmetric,
-)
-from .prediction import StrideSettings, lifted_model
+from .learning import SKIPPED, anti_windup, delivered, learned_by, symmetric
 from .signals import (
     PARTS,
     SAMPLES,
@@ -88,7 +79,7 @@ class Controller:
         if duration is not None:
             self._flight.stretch(np.arange(n), duration)
         self._always_retimes = duration is None and spec.law is None and spec.flight_law is None
-        self._laws = (bound(spec.law, self._context(0)), bound(spec.flight_law, self._context(1)))
+        self._laws = spec.bind_laws(robot, gaits, base=base, timestep=timestep).laws
         self.balance = spec.balance.bind(
             robot, gaits, base=base, gains=spec.gains, ticks=self.max_ticks, timestep=timestep
         )
@@ -104,23 +95,6 @@ class Controller:
         # Reasons why strides and stances are none to learn from, indices into `SKIPPED`.
         self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
         self._stance_verdict = np.zeros(n, dtype=np.intp)
-
-    def _context(self, part: int) -> LawContext:
-        """Context of the law of one part of the stride."""
-        spec = self.spec
-        settings = StrideSettings(
-            spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, self._timestep
-        )
-        return LawContext(
-            controller=spec.name,
-            part=PARTS[part],
-            robot=self.robot,
-            gaits=self.gaits,
-            base=self._base,
-            gains=spec.gains,
-            timestep=self._timestep,
-            lifted_models=lambda: [lifted_model(self.robot, gait, settings) for gait in self.gaits],
-        )
 
     @property
     def flight(self) -> Array:

@@ -15,10 +15,8 @@ from ...control import (
     ControllerSpec,
     LearningLaw,
     LiftedModel,
-    ModelBasedILC,
     PlanarStrides,
     StrideRecord,
-    StrideSettings,
     lifted_model,
     load_controller,
     phase_grid,
@@ -157,13 +155,11 @@ def compare_prediction(
     Raises:
         InvalidInput: The controller does not learn, or there are no strides before its learning.
     """
-    law = _law(spec)
     robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
-    settings = StrideSettings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
+    law = _law(replace(spec, flight_law=None).bind_laws(robot, [gait]))
+    settings = spec.stride_settings()
     rotors = Rotors(scenario.armature, scenario.damping)
     model = lifted_model(robot, gait, settings, rotors=rotors)
-    if isinstance(law, ModelBasedILC):
-        law = law.with_models([lifted_model(robot, gait, settings)])
     of_speed = strides.sel(speed=speed, method="nearest").sel(part="stance")
     count = int(of_speed["count"])
     first = int(np.argmax(of_speed["learning"].to_numpy()[:count] == 1))

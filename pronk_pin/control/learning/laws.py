@@ -187,8 +187,8 @@ def _is_law(law: object) -> bool:
     return not isinstance(law, type | Mapping | set) and callable(getattr(law, "update", None))
 
 
-def bound(law: LearningLaw | None, context: LawContext) -> LearningLaw | None:
-    """A law, or None, as a controller uses it: bound to the context if it has a `bind`.
+def bind_law(law: LearningLaw | None, context: LawContext) -> LearningLaw | None:
+    """Bind a law to its context; one without `bind`, or None, stays as it is.
 
     Raises:
         InvalidInput: It cannot learn there, or its `bind` answers no law.
