@@ -58,7 +58,7 @@ def loop(n: int, threads: int, *, chunked: bool) -> float:
     began = time.perf_counter()
     log = simulation.run()
     elapsed = time.perf_counter() - began
-    return float(np.nansum(log.scalars["duration"])) / 0.001 / elapsed
+    return float(np.nansum(log["duration"])) / 0.001 / elapsed
 
 
 def record(n: int) -> tuple[Simulation, Pieces]:

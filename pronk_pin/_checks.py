@@ -1,8 +1,9 @@
 """The one place where single values that a user passes in are checked: numbers, names, objects.
 
-Each check returns the value in the form that the package counts on (a `float` for `np.float64(3)`,
-a tuple for a list) or raises `InvalidInput`, which tells the parameter, the value and what was
-wanted. States and arrays are checked in `pronk_pin.robot.state`.
+Each check takes the parameter's name and its value, and returns the value in the form that the
+package counts on (a `float` for `np.float64(3)`, a tuple for a list) or raises `InvalidInput`,
+which tells the parameter, the value and what was wanted. States and arrays are checked in
+`pronk_pin.robot.state`.
 """
 
 from __future__ import annotations
@@ -58,17 +59,17 @@ class Interval:
     def __str__(self) -> str:
         """In words: "from 0 to 10 kg", "above 0", "from 1 on"."""
         unit = f" {self.unit}" if self.unit else ""
-        low, high = (f"{end:.15g}" for end in (self.low, self.high))
+        first = f"{'above' if self.above else 'from'} {self.low:.15g}"
+        last = f"{'below' if self.below else 'up to'} {self.high:.15g}"
         if math.isinf(self.low) and math.isinf(self.high):
-            return unit.strip() and f"in {self.unit}"
+            return unit and f"in{unit}"
         if math.isinf(self.high):
-            return f"above {low}{unit}" if self.above else f"from {low}{unit} on"
+            return f"{first}{unit}" if self.above else f"{first}{unit} on"
         if math.isinf(self.low):
-            return f"{'below' if self.below else 'up to'} {high}{unit}"
-        last = f"below {high}" if self.below else f"up to {high}"
-        if self.above:
-            return f"above {low}, {last}{unit}"
-        return f"from {low}, {last}{unit}" if self.below else f"from {low} to {high}{unit}"
+            return f"{last}{unit}"
+        if self.above or self.below:
+            return f"{first}, {last}{unit}"
+        return f"{first} to {self.high:.15g}{unit}"
 
 
 ANY = Interval()
@@ -89,11 +90,7 @@ def shown(value: object) -> str:
 
 
 def real(name: str, value: Any, within: Interval = ANY) -> float:
-    """A finite number within an interval, as a float.
-
-    Raises:
-        InvalidInput: Not a number (a bool is none), not finite, or outside.
-    """
+    """A finite number within an interval, as a float; a bool is no number."""
     number = _number(value)
     if number is None:
         raise InvalidInput(f"{name}={shown(value)} is {_kind(value)}; {_give('number', within)}")
@@ -103,11 +100,7 @@ def real(name: str, value: Any, within: Interval = ANY) -> float:
 
 
 def whole(name: str, value: Any, within: Interval = ANY) -> int:
-    """A whole number within an interval, as an int.
-
-    Raises:
-        InvalidInput: Not a whole number (3.0 and True are none), or outside.
-    """
+    """A whole number within an interval, as an int; 3.0 and True are none."""
     try:
         if isinstance(value, bool | np.bool_):
             raise TypeError
@@ -123,11 +116,7 @@ def whole(name: str, value: Any, within: Interval = ANY) -> int:
 
 
 def seed(name: str, value: Any) -> int:
-    """A seed of random numbers.
-
-    Raises:
-        InvalidInput: Not a whole number from 0 on that 64 bits can hold.
-    """
+    """A seed of random numbers: a whole number from 0 on that 64 bits can hold."""
     number = whole(name, value, NOT_NEGATIVE)
     if number > LARGEST_SEED:
         raise InvalidInput(f"{name}={shown(value)}; give a whole number from 0 to {LARGEST_SEED}")
@@ -135,33 +124,21 @@ def seed(name: str, value: Any) -> int:
 
 
 def flag(name: str, value: Any) -> bool:
-    """True or False.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """True or False."""
     if not isinstance(value, bool | np.bool_):
         raise InvalidInput(f"{name}={shown(value)} is {_kind(value)}; give True or False")
     return bool(value)
 
 
 def text(name: str, value: Any) -> str:
-    """A text.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """A text."""
     if not isinstance(value, str):
         raise InvalidInput(f"{name}={shown(value)} is {_kind(value)}; give a text")
     return str(value)
 
 
 def file_name(name: str, value: Any) -> str:
-    """A name that can be part of the name of a file, as those of controllers and scenarios are.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
+    """A name that can be part of the name of a file, as those of controllers and scenarios are."""
     word = text(name, value)
     if not _NAME.fullmatch(word) or len(word) > _LONGEST_NAME:
         raise InvalidInput(
@@ -172,28 +149,14 @@ def file_name(name: str, value: Any) -> str:
 
 
 def path(name: str, value: Any) -> Path:
-    """The path of a file or folder, from a text or a path.
-
-    Raises:
-        InvalidInput: Anything else, or an empty text.
-    """
+    """The path of a file or folder, from a path or a text that is not empty."""
     if not isinstance(value, str | Path) or value == "" or "\0" in str(value):
         raise InvalidInput(f"{name}={shown(value)} is no path; give a text or a pathlib.Path")
     return Path(value)
 
 
 def instance_of(name: str, value: Any, kind: type[T], wanted: str = "") -> T:
-    """An object of a class.
-
-    Args:
-        name: Name of the parameter.
-        value: What was given.
-        kind: The class.
-        wanted: What to give, as in "a Robot, as load_robot() returns it"; by default the class.
-
-    Raises:
-        InvalidInput: It is of another class.
-    """
+    """An object of a class; `wanted` as in "a Robot, as load_robot() returns it"."""
     if not isinstance(value, kind):
         what = wanted or _with_article(kind.__name__)
         raise InvalidInput(f"{name}={shown(value)} is {_kind(value)}; give {what}")
@@ -208,7 +171,7 @@ def sequence_of(
     length: int | None = None,
     wanted: str = "a sequence",
 ) -> tuple[T, ...]:
-    """A tuple from any sequence or one-dimensional array, each of its values checked.
+    """A tuple from any sequence or one-dimensional array; a text is none.
 
     Args:
         name: Name of the parameter.
@@ -216,9 +179,6 @@ def sequence_of(
         each: Checks one value, by its name and itself.
         length: How many there have to be; any number by default.
         wanted: What to give, as in "speeds [m/s]".
-
-    Raises:
-        InvalidInput: No sequence (a text is none), or not so many, or a value is wrong.
     """
     count = "" if length is None else f", {length} of them"
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
@@ -245,11 +205,7 @@ def reals(
 
 
 def numbers(**arrays: npt.ArrayLike) -> list[npt.NDArray[np.float64]]:
-    """Float64 arrays of any shape, by name; texts and truth values are no numbers.
-
-    Raises:
-        InvalidInput: One is no array of numbers.
-    """
+    """Float64 arrays of any shape, by name; texts and truth values are no numbers."""
     found = []
     for name, value in arrays.items():
         try:
@@ -276,7 +232,7 @@ def keep_reals(owner: object, intervals: Mapping[str, Interval], prefix: str = "
 
 
 def keep_vectors(
-    owner: object, intervals: Mapping[str, Interval], length: int = 3, prefix: str = ""
+    owner: object, intervals: Mapping[str, Interval], length: int | None = 3, prefix: str = ""
 ) -> None:
     """Check attributes of a frozen dataclass that are so many numbers, and keep them as tuples."""
     for name, within in intervals.items():
@@ -291,12 +247,7 @@ def keep_instances(owner: object, prefix: str = "", **kinds: type) -> None:
 
 
 def known_name(kind: str, name: Any, known: Collection[str]) -> str:
-    """The name itself, if it is known.
-
-    Raises:
-        UnknownName: It is not.
-        InvalidInput: It is no text.
-    """
+    """The name itself, if it is known; else `UnknownName`."""
     if not isinstance(name, str):
         raise InvalidInput(
             f"{kind} {shown(name)} is {_kind(name)}; give a name, one of: {', '.join(known)}"
@@ -338,20 +289,6 @@ def _give(what: str, within: Interval) -> str:
     return f"give a {what} {words}" if words else f"give a {what} that is finite"
 
 
-_MOST_WORKERS = 1024
-
-
 def worker_count(workers: int | None) -> int:
-    """Number of worker processes; None for one for each core.
-
-    Raises:
-        InvalidInput: Not a whole number, or none, or more than any machine has.
-    """
-    if workers is None:
-        return os.cpu_count() or 1
-    workers = whole("workers", workers)
-    if workers < 1:
-        raise InvalidInput(f"{workers} workers; at least one is needed")
-    if workers > _MOST_WORKERS:
-        raise InvalidInput(f"{workers} workers; give {_MOST_WORKERS} or fewer")
-    return workers
+    """Number of worker processes, no more than any machine has; None for one for each core."""
+    return none_or(whole, "workers", workers, Interval(1, 1024)) or os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""Processes: what a worker does first, and how one is ended amid a solver's work.
+"""Processes: what a worker does first, and how one is ended, amid a solver's work too.
 
 It imports the standard library only: a worker is to watch its parent before it imports the rest of
 this package, which takes seconds.
@@ -12,7 +12,7 @@ import shutil
 import signal
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import connection
 from multiprocessing.sharedctypes import Synchronized
@@ -64,15 +64,28 @@ def heeding_signals() -> Iterator[None]:
         came.append(number)
         raise KeyboardInterrupt
 
+    handled = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    try:
+        with handling(end, [one for one in handled if callable(signal.getsignal(one))]):
+            yield
+    finally:
+        if came:
+            signal.raise_signal(came[0])
+
+
+@contextmanager
+def handling(
+    handler: Callable[[int, FrameType | None], None], signals: Iterable[signal.Signals]
+) -> Iterator[None]:
+    """Have a handler answer to signals, and who did before do so again afterwards.
+
+    Nothing changes in a thread that is not the main one, where signals do not arrive.
+    """
     before = {}
     if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if callable(signal.getsignal(number)):
-                before[number] = signal.signal(number, end)
+        before = {number: signal.signal(number, handler) for number in signals}
     try:
         yield
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])
+        for number, earlier in before.items():
+            signal.signal(number, earlier)

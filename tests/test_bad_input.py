@@ -32,7 +32,9 @@ from pronk_pin.compare import (
     random_scenarios,
     run_experiment,
 )
+from pronk_pin.compare.results import make_folder
 from pronk_pin.compare.simulation import memory
+from pronk_pin.compare.simulation.quantities import STRIDE_QUANTITIES
 from pronk_pin.compare.studies.gain_reduction import sweep_gains
 from pronk_pin.compare.studies.prediction import simulate_learning
 from pronk_pin.compare.studies.seeding import measure_seeding
@@ -526,7 +528,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "transfers of pd": (
         lambda: measure_transfers(load_controller("pd"), (0.0, 0.1, 0.2), scenario(), []),
-        "controller 'pd' does not learn; transfers need a controller that learns",
+        "controller 'pd' does not learn in stance; choose one with a law, as 'ilc'",
     ),
     "gains of no speed": (
         lambda: sweep_gains(load_controller("ilc"), (), scenario()),
@@ -541,8 +543,8 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     # Looking
     "width": (lambda: Film(width=300.0), "width=300.0 is a float; give a whole number"),
-    "fps": (lambda: Film(fps="25"), "fps='25' is a str; give a number that is finite"),
-    "film of NaN": (lambda: Film(at=NAN), "at=nan; give a number that is finite"),
+    "fps": (lambda: Film(fps="25"), "fps='25' is a str; give a number above 0, up to 1000"),
+    "film of NaN": (lambda: Film(at=NAN), "at=nan; give a number from 0 on"),
     "track of texts": (lambda: Track("a", ["x"], Q[None]), "track 'a': t is not an array of numb"),
     "track by a number": (lambda: Track(3, np.zeros(1), Q[None]), "name of a track=3 is an int; "),
     "scene of nothing": (lambda: Scene(a1(), (None,)), "tracks[0]=None is nothing; give a Track"),
@@ -630,8 +632,7 @@ def test_what_does_not_fit_into_memory_is_refused_with_the_estimate_and_the_reme
     schedule = Schedule(baseline=100.0, learning=100.0)
     simulation = simulated(gaits=gaits, schedule=replace(schedule))
     log, estimate = simulation.strides, memory.log_size(gaits, schedule.duration)
-    arrays = [*log.scalars.values(), *log.curves.values(), log.base, log.attitude]
-    arrays += [log.peak_error, log.rms_error, log.contact_error]
+    arrays = [log[quantity.name] for quantity in STRIDE_QUANTITIES]
     assert estimate == pytest.approx(sum(array.nbytes for array in arrays), rel=0.02)
     monkeypatch.setattr(memory, "memory", lambda: 4.0 * estimate)
     memory.check_memory(gaits, schedule.duration)
@@ -676,9 +677,9 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["compare", "--robot", ""], "unknown robot ''; choose one of: a1, go1, go2, solo12"),
     (["compare", "--suite", "all"], "unknown suite 'all'; choose one of: default, mismatch"),
     (["compare", "--base", "None"], "unknown base 'None'; choose one of: locked, sagittal, free"),
-    ([*SHORT, "--workers", "0"], "0 workers; at least one is needed"),
-    ([*SHORT, "--workers", "-3"], "-3 workers; at least one is needed"),
-    ([*SHORT, "--workers", "1000000"], "1000000 workers; give 1024 or fewer"),
+    ([*SHORT, "--workers", "0"], "workers=0; give a whole number from 1 to 1024"),
+    ([*SHORT, "--workers", "-3"], "workers=-3; give a whole number from 1 to 1024"),
+    ([*SHORT, "--workers", "1000000"], "workers=1000000; give a whole number from 1 to 1024"),
     ([*SHORT, "--workers", "two"], "Error parsing --workers: "),
     ([*SHORT, "--executor", "here", "--folder", "x"], "executor 'here' is not an address; give d"),
     (
@@ -686,7 +687,7 @@ COMMANDS: list[tuple[list[str], str]] = [
         "nowhere.xml: missing; give the path",
     ),
     (["reproduce", "--seeds", "-1"], "seeds[0]=-1; give a whole number from 0 on"),
-    (["reproduce", "--workers", "0"], "0 workers; at least one is needed"),
+    (["reproduce", "--workers", "0"], "workers=0; give a whole number from 1 to 1024"),
     (["reproduce", "--seeds", "0", "0"], "seeds must name at least one, and none of them twice"),
     (["report", "nowhere"], "nowhere: not a results folder (no config.json); run 'pronk-pin comp"),
     (["report"], "PATH Results folder. (required); For full helptext, run: pronk-pin report --he"),
@@ -715,7 +716,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     ([*BUILD, "--speeds", "1:0:0.1"], "speeds '1:0:0.1' is neither a number nor a range A:B:STEP"),
     ([*BUILD, "--speeds", "nan"], "speeds 'nan' is neither a number nor a range A:B:STEP"),
     ([*BUILD, "--apex", "high"], "apex 'high' is neither a number nor a range A:B:STEP"),
-    ([*BUILD, "--speeds", "0", "--workers", "0"], "0 workers; at least one is needed"),
+    ([*BUILD, "--speeds", "0", "--workers", "0"], "workers=0; give a whole number from 1 to 1024"),
     ([*BUILD, "--gait", "gallop"], "unknown gait 'gallop'; choose one of: pronk, bound"),
     ([*BUILD, "--base", "free"], "unknown base 'free'; choose one of: locked, sagittal"),
     ([*BUILD, "--output", ""], "output='.' is no file; give the name of one, as gaits.npz"),
@@ -733,10 +734,10 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["ilc", "analyze", "pd"], "controller 'pd' does not learn in stance; choose one with a law"),
     (["ilc", "analyze", "--scenario", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
     (["ilc", "analyze", "--figure", "a.doc"], "figures cannot be written as 'doc'; choose png"),
-    (["ilc", "gains", "pd"], "controller 'pd' does not learn; choose one that does, as 'ilc'"),
+    (["ilc", "gains", "pd"], "controller 'pd' does not learn in stance; choose one wi"),
     (["ilc", "gains", "--speed", "7"], "speed 7 m/s is outside the gait library"),
-    (["ilc", "transfer", "pd"], "controller 'pd' does not learn; transfers need a controller"),
-    (["ilc", "transfer", "--speed", "0", "0.1"], "transfers need three speeds or more: one betwe"),
+    (["ilc", "transfer", "pd"], "controller 'pd' does not learn in stance; choose one"),
+    (["ilc", "transfer", "--speed", "0", "0.1"], "transfer needs three speeds or more: one betwee"),
     (["ilc", "transfer", "--scenarios", "moon"], "unknown scenario 'moon'; choose one of: ideal"),
     (["ilc", "transfer", "--speed", "0", "7", "8"], "speed 7 m/s is outside the gait library"),
     (["ilc", "seeding", "--speed", "0"], "seeding needs three speeds or more"),
@@ -749,8 +750,8 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["view", "--host", ""], "host is empty; give an address of this machine, as 127.0.0.1"),
     (["view", "--host", "a b"], "host='a b' is no address of this machine ("),
     (["view", "a\nb"], "a b: no such results folder or gait library"),
-    (["view", "--port", "70000"], "a port is a number from 0 to 65535, not 70000"),
-    (["view", "--port", "-1"], "a port is a number from 0 to 65535, not -1"),
+    (["view", "--port", "70000"], "port=70000; give a whole number from 0 to 65535"),
+    (["view", "--port", "-1"], "port=-1; give a whole number from 0 to 65535"),
     (["view", "--port", "http"], "Error parsing --port: "),
     (["view", "--duration", "-1"], "duration=-1.0; give a number above 0, up to 1000000 s"),
     (["view", "--duration", "nan"], "duration=nan; give a number above 0, up to 1000000 s"),
@@ -764,12 +765,15 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["view", "RESULT", "--controller", "lqr"], "no 'lqr' in scenario 'nominal'; the result has"),
     (["view", "RESULT", "--speed", "7"], "the result has no speed 7; choose one of: 0.3"),
     (["view", "--width", "3"], "width=3; give an even number of pixels from 64 to 4096"),
-    (["view", "--fps", "0"], "fps must be positive, not 0"),
-    (["view", "--fps", "1e9"], "fps must be positive, not 1000000000.0; and 1000 at most"),
-    (["view", "--at", "-1"], "at must not be negative, and seconds must be positive"),
+    (["view", "--fps", "0"], "fps=0.0; give a number above 0, up to 1000"),
+    (["view", "--fps", "1e9"], "fps=1000000000.0; give a number above 0, up to 1000"),
+    (["view", "--at", "-1"], "at=-1.0; give a number from 0 on"),
     (["view", "--color", "mass"], "color='mass'; choose error or torque, or leave it out"),
-    (["parity", "--states", "0"], "states=0; at least one is needed"),
-    (["parity", "--states", "1000000000"], "states=1000000000; give 1000000 or fewer"),
+    (["parity", "--states", "0"], "states=0; give a whole number from 1 to 1000000"),
+    (
+        ["parity", "--states", "1000000000"],
+        "states=1000000000; give a whole number from 1 to 1000000",
+    ),
     (["parity", "--tolerance", "nan"], "tolerance=nan; give a number from 0 on"),
     (["parity", "--seed", "-1"], "seed=-1; give a whole number from 0 on"),
     (["parity", "nowhere.xml"], "nowhere.xml: missing; give the path of a URDF or an MJCF"),
@@ -792,7 +796,8 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A results folder in which nothing was simulated yet."""
     folder = tmp_path_factory.mktemp("results") / "empty"
     both = experiment(controllers=("pd", "ilc"), scenarios=("nominal", "payload"))
-    return Results.create(both, folder).folder
+    make_folder(Results.of(both, folder))
+    return folder
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import io
 import signal
 import sys
 import textwrap
-import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +20,7 @@ import tyro
 from tyro.conf import OmitSubcommandPrefixes, subcommand
 
 from .._checks import known_name
+from .._workers import handling
 from ..compare import Results
 from ..compare.experiment import SUITES, load_suite
 from ..errors import LeakyFilter, OtherMachine, PronkError
@@ -115,16 +115,10 @@ def _orderly_end() -> Iterator[list[int]]:
             asked.append(number)
             raise SystemExit(128 + number)
 
-    before = {}
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) == signal.SIG_DFL:  # `nohup` wants it ignored
-                before[number] = signal.signal(number, end)
-    try:
+    signals = (signal.SIGTERM, signal.SIGHUP)
+    # `nohup` wants its own ignored.
+    with handling(end, [one for one in signals if signal.getsignal(one) == signal.SIG_DFL]):
         yield asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _parsed(arguments: list[str]) -> _Runs:

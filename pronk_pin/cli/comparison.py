@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from tyro.conf import Positional, arg
 
-from .._checks import none_or, real, seed, whole, worker_count
+from .._checks import none_or, real, seed, whole
 from ..compare import (
     Experiment,
     Results,
@@ -20,14 +21,14 @@ from ..compare import (
     mjcf_parity,
     run_experiment,
 )
-from ..compare.experiment import check_demand, known_address, load_suite
+from ..compare.experiment import SUITES, load_suite
 from ..compare.identification import DRAWS, IMU_NOISE, check_learner
-from ..compare.report import families, format_changes, format_suite, format_tables
+from ..compare.report import format_changes, format_summary
 from ..compare.studies import close_loop, format_loop, format_reproduction
 from ..errors import InvalidInput
 from ..robot import load_robot
 from ..robot.formats import write_mjcf, write_urdf
-from ..viz import known_format, write_replay
+from ..viz import known_figure, write_replay
 from ..viz.figures import write_explanation_figure
 from ..viz.report import write_figures, write_report
 from ..viz.scenes import nearest, result_menu
@@ -57,11 +58,6 @@ class Compare:
 
     def run(self) -> None:
         """Do it."""
-        workers = worker_count(self.workers)
-        if self.executor is None:
-            check_demand(self.experiment, workers)  # before a folder is made
-        else:
-            known_address(self.executor)
         name = "comparison" if self.suite == "default" else self.suite
         folder, world = self.folder or default_folder(name), self.experiment.mjcf
         if world:
@@ -74,7 +70,7 @@ class Compare:
             resimulate=self.resimulate,
         )
         print(f"robot {results.experiment.robot}, base {results.experiment.base}\n")
-        _print_tables(results)
+        print(format_summary(results.summary()))
         _write_pages(results)
 
 
@@ -122,7 +118,7 @@ class Report:
         if self.other is not None:
             print(format_changes(results, Results.load(self.other)))
             return
-        _print_tables(results)
+        print(format_summary(results.summary()))
         _write_pages(results)
         if self.figures is not None:
             for path in write_figures(results, self.figures):
@@ -171,16 +167,13 @@ class Explain:
         strides = results.all_strides(controller=self.controller, scenario=self.scenario)
         rng = np.random.default_rng(self.seed)
         explanation = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
-        print(f"{cell.controller} in scenario {cell.scenario}\n\n{describe(explanation)}")
+        text = describe(explanation)
+        print(f"{cell.controller} in scenario {cell.scenario}\n\n{text}")
         if self.figure is not None:
             print(
                 f"\nfigure  {write_explanation_figure(explanation, self.figure, speed=self.speed)}"
             )
-        notes = [
-            f"{explanation.robot.name}, identified by what learning found",
-            "",
-            describe(explanation),
-        ]
+        notes = [f"{explanation.robot.name}, identified by what learning found", "", text]
         if self.write_urdf is not None:
             print(f"\nurdf    {write_urdf(explanation.identified, self.write_urdf, notes)}")
         if self.write_mjcf is not None:
@@ -196,22 +189,33 @@ class Explain:
         none_or(real, "speed", self.speed)
         check_learner(self.controller)
         if self.figure is not None:
-            known_format(self.figure.suffix.removeprefix("."))
+            known_figure(self.figure)
 
 
-def _print_tables(results: Results) -> None:
-    """Table I, overview and verdict of one scenario; the overviews of many and one verdict."""
-    summary, scenarios = results.summary(), families(results.experiment.scenarios)
-    if len(scenarios) > 1:
-        print(format_suite(summary))
-    else:
-        print(format_tables(summary, scenario=scenarios[0]))
+def command_line(experiment: Experiment) -> str:
+    """The command that runs an experiment."""
+    for name in SUITES:
+        if load_suite(name) == experiment:
+            return f"pronk-pin compare --suite {name}"
+    words = ["pronk-pin compare", f"--robot {experiment.robot}"]
+    words += ["--speeds " + " ".join(f"{speed:g}" for speed in experiment.speeds)]
+    words += ["--controllers " + " ".join(experiment.controllers)]
+    words += ["--scenarios " + " ".join(experiment.scenarios)]
+    words += ["--seeds " + " ".join(map(str, experiment.seeds))]
+    words += [f"--base {experiment.base}"]
+    words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []
+    schedule = experiment.schedule
+    words += [
+        f"--schedule.{name} {getattr(schedule, name):g}"
+        for name in ("startup", "baseline", "learning", "scatter")
+    ]
+    return " ".join(words)
 
 
 def _write_pages(results: Results) -> None:
     """The report and the replay of a result, with their names printed."""
     print(f"\nresults  {results.folder}")
-    print(f"report   {write_report(results)}")
+    print(f"report   {write_report(results, command=command_line(results.experiment))}")
     try:
         replay = str(write_replay(result_menu(results), results.folder / "replay.html"))
     except InvalidInput as error:  # no stride was finished

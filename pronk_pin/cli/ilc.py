@@ -24,7 +24,7 @@ from ..compare.studies import (
     sweep_gains,
 )
 from ..control import load_controller
-from ..viz import known_format, save_figure
+from ..viz import known_figure, save_figure
 from ..viz.figures import errors_by_seed, gains_figure, predicted_and_measured, transfers_figure
 
 
@@ -55,7 +55,7 @@ class Analyze:
     def run(self) -> None:
         """Do it."""
         whole("strides", self.strides, STRIDES)
-        known_format(self.figure.suffix.removeprefix("."))
+        known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         if self.result is None:
             strides = simulate_learning(
@@ -92,7 +92,7 @@ class Gains:
 
     def run(self) -> None:
         """Do it."""
-        known_format(self.figure.suffix.removeprefix("."))
+        known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         table = sweep_gains(spec, self.speed, scenario, robot=self.robot)
         print(describe_gains(table))
@@ -122,7 +122,7 @@ class Transfer:
 
     def run(self) -> None:
         """Do it."""
-        known_format(self.figure.suffix.removeprefix("."))
+        known_figure(self.figure)
         table = measure_transfers(
             load_controller(self.controller),
             self.speed,
@@ -152,7 +152,7 @@ class Seeding:
 
     def run(self) -> None:
         """Do it."""
-        known_format(self.figure.suffix.removeprefix("."))
+        known_figure(self.figure)
         table = measure_seeding(self.speed, load_scenario(self.scenario), robot=self.robot)
         print(describe_seeding(table))
         print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")

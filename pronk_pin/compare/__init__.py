@@ -4,17 +4,11 @@ Comes in: an `Experiment`: robot, speeds, controllers, scenarios, seeds.
 Goes out: `Results`: a folder of strides, a summary, tables, and what was learned.
 """
 
-from .experiment import (
-    DEFAULT_CONTROLLERS,
-    Cell,
-    Experiment,
-    Results,
-    default_folder,
-    run_cell,
-    run_experiment,
-)
+from .execution import run_experiment
+from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
 from .identification import Explanation, describe, explain
 from .metrics import reduction, steady, summarize
+from .results import Results, default_folder
 from .simulation import Schedule, Simulation
 from .world import (
     KNOWN,

@@ -18,7 +18,16 @@ from ..kinematics import rotate_leg
 from ..robot import BASES, NL, Robot, as_array, as_numbers
 from .controller_spec import ControllerSpec
 from .feedback import SpeedEstimator
-from .learning import SKIPPED, anti_windup, delivered, learned_by, symmetric
+from .learning import (
+    SKIPPED,
+    LawContext,
+    anti_windup,
+    bound,
+    delivered,
+    learned_by,
+    symmetric,
+)
+from .prediction import StrideSettings, lifted_model
 from .signals import (
     PARTS,
     SAMPLES,
@@ -41,6 +50,22 @@ _LATE_TOUCHDOWN = 1.2
 
 TIMESTEP = Interval(1e-5, 0.01, "s")
 """Time steps of the control that make sense."""
+
+
+def _known_feedforward(feedforward: Array | None, n: int) -> Array:
+    """The feedforward to begin with [N m], shape (n, 2, samples, 12), copied; by default none."""
+    shape = (n, len(PARTS), SAMPLES, NL)
+    if feedforward is None:
+        return np.zeros(shape)
+    feedforward = as_numbers("feedforward", feedforward)
+    if feedforward.shape != shape:
+        raise InvalidInput(
+            f"a feedforward of shape {feedforward.shape}; expected {shape}: "
+            "torques on the phase grids of stance and flight for each gait"
+        )
+    if not np.isfinite(feedforward).all():
+        raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
+    return feedforward.copy()
 
 
 class Controller:
@@ -68,33 +93,52 @@ class Controller:
         flight: Array | None = None,
         base: str = "locked",
     ) -> None:
-        gaits, timestep = _known_setting(robot, gaits, spec, timestep, base)
+        gaits = known_gaits(robot, gaits)
+        instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
+        timestep = real("timestep", timestep, TIMESTEP)
+        known_name("base", base, BASES)
         n = len(gaits)
-        self.feedforward, duration = _known_start(n, feedforward, flight)
-        self.robot, self.spec, self.gaits = robot, spec, gaits
+        self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
+        self.feedforward = _known_feedforward(feedforward, n)
+        self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
         self._timestep, self._base = timestep, base
-        self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
-        self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
-        self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
-        if duration is not None:
-            self._flight.stretch(np.arange(n), duration)
-        self._always_retimes = duration is None and spec.law is None and spec.flight_law is None
-        self._laws = spec.bind_laws(robot, gaits, base=base, timestep=timestep).laws
-        self.balance = spec.balance.bind(
-            robot, gaits, base=base, gains=spec.gains, ticks=self.max_ticks, timestep=timestep
-        )
+        self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
+        self._tilt = np.zeros((n, len(PARTS)))
+        # Why a stance was none, index into `SKIPPED`.
+        self._stance_verdict = np.zeros(n, dtype=np.intp)
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
+        self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
+        self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
+        self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
+        if flight is not None:
+            self._flight.stretch(np.arange(n), as_array("flight", flight, n, ()))
+        context = self._context()
+        self._laws = [bound(law, context) for law in spec.laws]
+        self.balance = spec.balance.bind(context)
+        self._always_retimes = flight is None and not any(self._laws)
         end = np.array([1.0])
         self._lift_off_speed = np.array(
             [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
         )
-        self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
-        self._tilt = np.zeros((n, len(PARTS)))
-        # Reasons why strides and stances are none to learn from, indices into `SKIPPED`.
-        self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
-        self._stance_verdict = np.zeros(n, dtype=np.intp)
+
+    def _context(self) -> LawContext:
+        """What laws and balance are bound to."""
+        spec, timestep = self.spec, self._timestep
+        settings = StrideSettings(
+            spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
+        )
+        return LawContext(
+            robot=self.robot,
+            gaits=self.gaits,
+            controller=spec.name,
+            gains=spec.gains,
+            base=self._base,
+            timestep=timestep,
+            ticks=self.max_ticks,
+            lifted_model=lambda gait: lifted_model(self.robot, gait, settings),
+        )
 
     @property
     def flight(self) -> Array:
@@ -273,37 +317,3 @@ class Controller:
                 flight.duration[rows], self._flight_measured[rows], flight.planned[rows]
             )
             flight.stretch(rows, following)
-
-
-def _known_setting(
-    robot: Robot, gaits: Sequence[Gait], spec: ControllerSpec, timestep: float, base: str
-) -> tuple[tuple[Gait, ...], float]:
-    """The gaits and the timestep of a controller, checked with all that it is made for."""
-    gaits = known_gaits(robot, gaits)
-    instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
-    timestep = real("timestep", timestep, TIMESTEP)
-    known_name("base", base, BASES)
-    return gaits, timestep
-
-
-def _known_start(
-    n: int, feedforward: Array | None, flight: Array | None
-) -> tuple[Array, Array | None]:
-    """The feedforward (n, 2, samples, 12) and the flights' durations (n,) of the start, checked.
-
-    The feedforward is a copy, zero by default; without durations it is None.
-    """
-    shape = (n, len(PARTS), SAMPLES, NL)
-    if flight is not None:
-        flight = as_array("flight", flight, n, ())
-    if feedforward is None:
-        return np.zeros(shape), flight
-    feedforward = as_numbers("feedforward", feedforward)
-    if feedforward.shape != shape:
-        raise InvalidInput(
-            f"a feedforward of shape {feedforward.shape}; expected {shape}: "
-            "torques on the phase grids of stance and flight for each gait"
-        )
-    if not np.isfinite(feedforward).all():
-        raise InvalidInput("feedforward holds NaN or infinite values; give finite torques")
-    return feedforward.copy(), flight

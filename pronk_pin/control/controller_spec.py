@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from .._checks import (
@@ -15,22 +14,17 @@ from .._checks import (
     known_name,
     whole,
 )
-from ..gait import Gait
-from ..robot import Robot
 from .feedback import SPEED_FILTER, AttitudeFilter, BalanceSpec, LegAngleRegulator
 from .learning import (
     FLIGHT_LAW,
     CurrentIterationILC,
-    LawContext,
     LearningLaw,
     NormOptimalILC,
     PaperILC,
     PDTypeILC,
     StrideSelection,
-    bind_law,
     known_law,
 )
-from .prediction import StrideSettings, lifted_model
 from .signals import ContactDetector, FlightTiming, Gains, ZeroPhaseFilter
 
 SOURCES = ("none", "model", "library", "identified")
@@ -107,54 +101,6 @@ class ControllerSpec:
     def laws(self) -> tuple[LearningLaw | None, ...]:
         """The learning laws, in the order of `PARTS`."""
         return self.law, self.flight_law
-
-    def stride_settings(self, timestep: float = 0.001) -> StrideSettings:
-        """Settings that shape the controller's planar strides, for a time step of the control [s].
-
-        See `lifted_model`.
-        """
-        return StrideSettings(
-            self.gains, self.regulator, self.speed_filter, self.touchdown_ticks, timestep
-        )
-
-    def bind_laws(
-        self,
-        robot: Robot,
-        gaits: Sequence[Gait],
-        *,
-        base: str = "locked",
-        timestep: float = 0.001,
-    ) -> ControllerSpec:
-        """The controller with its learning laws bound to robots: see `LawContext`.
-
-        Args:
-            robot: The robot.
-            gaits: The gait of each of the n robots.
-            base: How the trunks may move.
-            timestep: Time step of the control [s].
-
-        Raises:
-            InvalidInput: A law cannot learn there.
-        """
-        settings = self.stride_settings(timestep)
-
-        def context(part: str) -> LawContext:
-            return LawContext(
-                controller=self.name,
-                part=part,
-                robot=robot,
-                gaits=gaits,
-                base=base,
-                gains=self.gains,
-                timestep=timestep,
-                lifted_models=lambda: [lifted_model(robot, gait, settings) for gait in gaits],
-            )
-
-        return replace(
-            self,
-            law=bind_law(self.law, context("stance")),
-            flight_law=bind_law(self.flight_law, context("flight")),
-        )
 
 
 _ILC = ControllerSpec("ilc", law=PDTypeILC(), flight_law=FLIGHT_LAW, timing=FlightTiming())

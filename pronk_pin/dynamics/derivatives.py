@@ -57,16 +57,7 @@ def flight_derivatives(
 ) -> FlightDerivatives:
     """Derivatives of `flight_dynamics` by q, v and tau.
 
-    A derivative by q is by the small motion d of `pinocchio.integrate(model, q, d)`.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (19,).
-        v: Velocity, shape (18,).
-        tau: Motor torques [N m], shape (12,).
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    Arguments and errors are those of `stance_derivatives`, as is what a derivative by q means.
     """
     q, v = as_state(robot, q, v)
     as_one("q", q)

@@ -6,6 +6,7 @@ or a batch, with the batch first.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from scipy.integrate import trapezoid
 from .._checks import SHARE, real
 from .._typing import Array
 from ..errors import InvalidInput
-from ..robot import NB, Robot, as_array, as_numbers, as_q, as_robot, as_state
+from ..robot import NB, Robot, as_array, as_numbers, as_q, as_robot, as_state, by_state
 
 
 class CentroidalMomentum(NamedTuple):
@@ -43,53 +44,30 @@ def kinetic_energy(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
         InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
     """
     q, v = as_state(robot, q, v)
-    if q.ndim == 1:
-        return np.asarray(pin.computeKineticEnergy(robot.model, robot.data, q, v))
-    energy = np.empty(q.shape[:-1])
-    for row in np.ndindex(energy.shape):
-        energy[row] = pin.computeKineticEnergy(robot.model, robot.data, q[row], v[row])
-    return energy
+    return by_state(partial(pin.computeKineticEnergy, robot.model, robot.data), (), q, v)
 
 
 def potential_energy(robot: Robot, q: npt.ArrayLike) -> Array:
     """Potential energy in gravity [J], zero with the centre of mass at the height 0; batched.
 
-    Args:
-        robot: The robot.
-        q: Configuration, shape (..., 19).
-
-    Returns:
-        Shape (...).
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    Arguments, shape and errors are those of `kinetic_energy`.
     """
     q = as_q(robot, q)
-    energy = np.empty(q.shape[:-1])
-    for row in np.ndindex(energy.shape):
-        energy[row] = pin.computePotentialEnergy(robot.model, robot.data, q[row])
-    return energy
+    return by_state(partial(pin.computePotentialEnergy, robot.model, robot.data), (), q)
 
 
 def centroidal_momentum(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> CentroidalMomentum:
     """Linear and angular momentum about the centre of mass; batched.
 
     Rotors (armature) are not part of it: what turns inside a link is unknown to the model.
-
-    Args:
-        robot: The robot.
-        q: Configuration, shape (..., 19).
-        v: Velocity, shape (..., 18).
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    Arguments and errors are those of `kinetic_energy`.
     """
     q, v = as_state(robot, q, v)
-    momentum = np.empty((*q.shape[:-1], 6))
-    for row in np.ndindex(q.shape[:-1]):
-        momentum[row] = pin.computeCentroidalMomentum(
-            robot.model, robot.data, q[row], v[row]
-        ).vector
+
+    def about_centre(q_row: Array, v_row: Array) -> Array:
+        return np.array(pin.computeCentroidalMomentum(robot.model, robot.data, q_row, v_row).vector)
+
+    momentum = by_state(about_centre, (6,), q, v)
     return CentroidalMomentum(momentum[..., :3], momentum[..., 3:])
 
 

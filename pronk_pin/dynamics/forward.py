@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ import pinocchio as pin
 from .._checks import SHARE, real
 from .._typing import Array
 from ..kinematics import Contact, bias_at, contact_radius, jacobian_at
-from ..robot import NB, Robot, as_array, as_one, as_robot, as_state, leg_indices
+from ..robot import NB, Robot, as_array, as_one, as_robot, as_state, by_state, leg_indices
 from .stance import (
     NO_GAINS,
     Impact,
@@ -58,12 +59,7 @@ def flight_dynamics(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike, tau: npt.A
     q, v = as_state(robot, q, v)
     tau = robot.joint_torques(as_array("tau", tau, robot.nu, q.shape[:-1]), v[..., NB:])
     force = np.concatenate([np.zeros((*tau.shape[:-1], NB)), tau], axis=-1)
-    a = np.empty_like(v)
-    aba, model, data = pin.aba, robot.model, robot.data
-    rows = (x.reshape(-1, x.shape[-1]) for x in (q, v, force, a))
-    for q_row, v_row, force_row, out in zip(*rows, strict=True):
-        out[:] = aba(model, data, q_row, v_row, force_row)
-    return a
+    return by_state(partial(pin.aba, robot.model, robot.data), (robot.nv,), q, v, force)
 
 
 def stance_dynamics(

@@ -53,7 +53,7 @@ class PhaseSimulation:
         t: Times since the start [s], shape (n,).
         q: Configurations, shape (n, 19).
         v: Velocities, shape (n, 18).
-        a: StanceDynamics, shape (n, 18).
+        a: Accelerations, shape (n, 18).
         tau: Motor torques [N m], shape (n, 12).
         lam: Contact forces in the world's axes [N], shape (n, 3 feet).
         foot_drift: How far a standing foot strays from where it stood [m]; of a rolling foot the

@@ -12,7 +12,7 @@ from typing import Any, TypedDict
 
 import numpy as np
 
-from .._checks import instance_of, real, sequence_of
+from .._checks import instance_of, none_or, real, sequence_of
 from .._checks import path as known_path
 from .._typing import Array
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange
@@ -73,8 +73,7 @@ class GaitLibrary:
             raise InvalidInput(
                 f"{len(self.audit)} audits for {len(self.gaits)} gaits; give each one"
             )
-        for index, found in enumerate(self.audit):
-            gait = self.gaits[index]
+        for gait, found in zip(self.gaits, self.audit, strict=bool(self.audit)):
             if gait.sha256 != found.motion:
                 raise InvalidInput(
                     f"the gait at {gait.speed:g} m/s is not the one that was audited; "
@@ -118,7 +117,8 @@ class GaitLibrary:
         Raises:
             InvalidInput: There is no such gait; the error lists the grid.
         """
-        row = self._row(apex)
+        apex = none_or(real, "apex", apex)
+        row = _index(self.apexes, self.apex if apex is None else apex, "apex")
         return row * len(self.speeds) + _index(self.speeds, real("speed", speed), "speed")
 
     def at_apex(self, apex: float | None = None) -> GaitLibrary:
@@ -127,16 +127,13 @@ class GaitLibrary:
         Raises:
             InvalidInput: There is no such apex; the error lists the grid.
         """
-        n, row = len(self.speeds), self._row(apex)
+        height = self.apex if apex is None else real("apex", apex)
+        n, row = len(self.speeds), _index(self.apexes, height, "apex")
         part = slice(row * n, (row + 1) * n)
         metadata = {
             key: value[part] if key in PER_GAIT else value for key, value in self.metadata.items()
         }
         return GaitLibrary(self.gaits[part], metadata, self.audit[part])
-
-    def _row(self, apex: float | None) -> int:
-        """Index in `apexes` of an apex of the grid; by default the library's own."""
-        return _index(self.apexes, self.apex if apex is None else real("apex", apex), "apex")
 
     def at(self, speed: float, apex: float | None = None) -> Gait:
         """The gait at a speed [m/s] and apex [m], interpolated in both: eq. (13).
@@ -257,7 +254,8 @@ def from_arrays(arrays: StoredArrays) -> GaitLibrary:
         if len(audits) > len(gaits):
             raise arrays.damaged(f"{len(audits)} audits for {len(gaits)} gaits")
         found = tuple(
-            Audit.from_stored(gaits[index].speed, stored) for index, stored in enumerate(audits)
+            Audit.from_stored(gait.speed, stored)
+            for gait, stored in zip(gaits[: len(audits)], audits, strict=True)
         )
         return GaitLibrary(gaits, metadata, found, float(arrays.numbers("default_apex")))
     except InvalidInput as error:

@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, Literal
 
 from .._checks import (
@@ -243,7 +244,6 @@ def _check_sequence(sequence: tuple[ContactPhase, ...]) -> None:
     for pair in PAIRS:
         if not any(pair in phase.stands for phase in sequence):
             raise InvalidInput(f"the {pair} legs never stand; add them to a phase")
-    for index, phase in enumerate(sequence):
-        before = sequence[index - 1]  # the last one comes before the first
+    for before, phase in pairwise((sequence[-1], *sequence)):
         if before.stands == phase.stands:
             raise InvalidInput(f"{before.name} and {phase.name} have the same feet; merge them")

@@ -109,8 +109,8 @@ class Feedforward:
         flight: Motor torques in flight [N m], shape (samples, 12).
         lam: Contact forces in stance in the world's axes [N], shape (samples, 4, 3).
         constraint: Forces of the planar constraint in stance, see `InverseDynamics`, shape
-        (samples, constraints). feasible: Whether stance keeps to the equations, cones and limits,
-        shape (samples,).
+            (samples, constraints).
+        feasible: Whether stance keeps to the equations, cones and limits, shape (samples,).
     """
 
     s: Array

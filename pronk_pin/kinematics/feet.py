@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +21,11 @@ from ..robot import (
     as_q,
     as_robot,
     as_state,
+    by_state,
     leg_indices,
     rotation_matrix,
 )
+from .contacts import Contact, contact_radius
 from .legs import Hip, Knee, LegGeometry, leg_angles, leg_geometry, leg_motion
 
 _ROUND_OFF = 1e-9
@@ -63,27 +65,13 @@ def foot_positions(robot: Robot, q: npt.ArrayLike) -> Array:
         pin.framesForwardKinematics(model, data, row)
         return [placements[foot].translation for foot in ids]
 
-    if q.ndim == 1:
-        return np.array(feet(q))
-    positions = np.empty((*q.shape[:-1], len(ids), 3))
-    for row, out in zip(q.reshape(-1, robot.nq), positions.reshape(-1, len(ids), 3), strict=True):
-        out[:] = feet(row)
-    return positions
+    return by_state(feet, (len(ids), 3), q)
 
 
 def foot_velocities(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
-    """Velocities of the feet's centres in the world: the middle of eq. (3); batched.
+    """Velocities of the feet's centres in the world: the middle of eq. (3) [m/s]; batched.
 
-    Args:
-        robot: The robot.
-        q: Configuration, shape (..., 19).
-        v: Velocity, shape (..., 18).
-
-    Returns:
-        Velocities [m/s], shape (..., 4, 3), in the order of `robot.legs`.
-
-    Raises:
-        InvalidInput: A wrong shape, NaN, or a quaternion that is not normalised.
+    As `foot_positions`, with the velocity v, shape (..., 18).
     """
     q, v = as_state(robot, q, v)
     model, data, ids, world = robot.model, robot.data, robot.foot_ids, pin.LOCAL_WORLD_ALIGNED
@@ -92,13 +80,7 @@ def foot_velocities(robot: Robot, q: npt.ArrayLike, v: npt.ArrayLike) -> Array:
         pin.forwardKinematics(model, data, q_row, v_row)
         return [pin.getFrameVelocity(model, data, foot, world).linear for foot in ids]
 
-    if q.ndim == 1:
-        return np.array(feet(q, v))
-    velocities = np.empty((*q.shape[:-1], len(ids), 3))
-    states = q.reshape(-1, robot.nq), v.reshape(-1, robot.nv), velocities.reshape(-1, len(ids), 3)
-    for q_row, v_row, out in zip(*states, strict=True):
-        out[:] = feet(q_row, v_row)
-    return velocities
+    return by_state(feet, (len(ids), 3), q, v)
 
 
 def leg_inverse_kinematics(
@@ -139,7 +121,7 @@ def leg_odometry(
     v: npt.ArrayLike,
     *,
     feet: Iterable[str] | None = None,
-    contact: Literal["point", "rolling"] = "rolling",
+    contact: Contact = "rolling",
 ) -> Array:
     """Trunk velocity from legs that stand without slipping; closed form, batched.
 
@@ -168,7 +150,7 @@ def leg_odometry(
     stance = leg_indices(robot, feet)
     if not stance:
         raise InvalidInput("odometry needs at least one leg in stance; feet is empty")
-    known_name("contact", contact, ("point", "rolling"))
+    radius = contact_radius(robot, contact)
     shape = (*q.shape[:-1], len(robot.legs), len(JOINTS))
     legs = leg_motion(leg_geometry(robot), q[..., 7:].reshape(shape), v[..., NB:].reshape(shape))
     rotation = rotation_matrix(q[..., 3:7])
@@ -176,8 +158,8 @@ def leg_odometry(
     position, velocity, calf_rate = (motion[..., stance, :].mean(axis=-2) for motion in legs)
     spin = v[..., 3:NB]
     trunk = -velocity - np.cross(spin, position)  # (..., 3), in the trunk
-    if contact == "rolling":
-        trunk += np.cross(spin + calf_rate, robot.foot_radius * rotation[..., 2, :])
+    if radius:
+        trunk += np.cross(spin + calf_rate, radius * rotation[..., 2, :])
     return np.asarray(np.einsum("...ij,...j->...i", rotation, trunk))
 
 

@@ -18,7 +18,7 @@ from typing import Any, Literal, TypeAlias
 import mujoco
 import numpy as np
 
-from .._checks import NOT_NEGATIVE, instance_of, real, whole
+from .._checks import NOT_NEGATIVE, Interval, instance_of, none_or, real, whole
 from .._typing import Array
 from ..errors import FileProblem, InvalidInput
 from ..robot import Robot, read_urdf
@@ -35,8 +35,6 @@ _GIVE = "give the path of a URDF or an MJCF"
 
 ROUND_OFF = 1e-9
 """Relative tolerance for models with all their digits."""
-
-_MOST_STATES = 1_000_000
 
 SIX_DIGITS = 1e-5
 """Relative tolerance for an MJCF of six significant digits, as MuJoCo writes it."""
@@ -160,15 +158,9 @@ def compare_models(
         InvalidInput: A model is not of a robot with hinges and slides, or an option is out of
             range.
     """
-    states = whole("states", states)
-    if states < 1:
-        raise InvalidInput(f"states={states}; at least one is needed")
-    if states > _MOST_STATES:
-        raise InvalidInput(f"states={states}; give {_MOST_STATES} or fewer")
-    if rng is not None:
-        instance_of("rng", rng, np.random.Generator, "a numpy.random.Generator")
-    if tolerance is not None:
-        tolerance = real("tolerance", tolerance, NOT_NEGATIVE)
+    states = whole("states", states, Interval(1, 1_000_000))
+    none_or(instance_of, "rng", rng, np.random.Generator, "a numpy.random.Generator")
+    tolerance = none_or(real, "tolerance", tolerance, NOT_NEGATIVE)
     first, second = _read(a), _read(b)
     if tolerance is None:
         tolerance = max(ROUND_OFF, first.round_off, second.round_off)

@@ -26,6 +26,7 @@ from .state import (
     as_q,
     as_robot,
     as_state,
+    by_state,
     leg_indices,
     sound_base,
 )
@@ -52,6 +53,7 @@ __all__ = [
     "as_q",
     "as_robot",
     "as_state",
+    "by_state",
     "from_mujoco",
     "from_paper",
     "joint_order",

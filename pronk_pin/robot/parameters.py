@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from .._checks import Interval, real, reals
+from .._checks import ANY, Interval, keep_reals, keep_vectors
 from .._typing import Array, IntArray
 from ..errors import InvalidInput
 
@@ -26,10 +26,7 @@ written as tanh(v / SLIDING), so that it has a derivative."""
 BY_JOINT = ("armature", "damping", "coulomb")
 """Parameters with a value for each kind of joint."""
 
-
-_BY_JOINT = Interval(0, 1000)
 _PAYLOAD = Interval(-1000, 1000, "kg")
-_CONSTANT = Interval(0, 100, above=True)
 
 
 @dataclass(frozen=True)
@@ -55,13 +52,9 @@ class ModelParameters:
     torque_constant: float = 1.0
 
     def __post_init__(self) -> None:
-        keep = object.__setattr__  # a list would not be hashable
-        for name in BY_JOINT:
-            keep(self, name, reals(name, getattr(self, name), _BY_JOINT))
-        for name in ("payload_position", "trunk_shift"):
-            keep(self, name, reals(name, getattr(self, name), length=3))
-        for name, within in (("payload", _PAYLOAD), ("torque_constant", _CONSTANT)):
-            keep(self, name, real(name, getattr(self, name), within))
+        keep_vectors(self, dict.fromkeys(BY_JOINT, Interval(0, 1000)), length=None)
+        keep_vectors(self, {"payload_position": ANY, "trunk_shift": ANY})
+        keep_reals(self, {"payload": _PAYLOAD, "torque_constant": Interval(0, 100, above=True)})
 
     @property
     def ideal_motors(self) -> bool:

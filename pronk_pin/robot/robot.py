@@ -159,26 +159,26 @@ class Robot:
     @cached_property
     def joint_kinds(self) -> IntArray:
         """For each joint its place in the leg, 0 for a hip; -1 for joints of no leg, (12,)."""
-        kinds = {
-            name: kind for leg in self.legs for kind, name in enumerate(self.spec.leg_joints(leg))
-        }
-        return np.array([kinds.get(name, -1) for name in self.joint_names], dtype=np.intp)
+        return np.array([kind for _, kind in self._places], dtype=np.intp)
 
     @cached_property
     def joint_coordinates(self) -> dict[str, tuple[str, list[str]]]:
         """Coordinates of a dataset's axis `joint`: its name, its leg, and its kind in `JOINTS`."""
+        return {
+            "joint": ("joint", [name.removesuffix("_joint") for name in self.joint_names]),
+            "leg": ("joint", [leg for leg, _ in self._places]),
+            "kind": ("joint", [JOINTS[kind] if leg else "" for leg, kind in self._places]),
+        }
+
+    @property
+    def _places(self) -> list[tuple[str, int]]:
+        """For each joint its leg and its place in it; "" and -1 for joints of no leg."""
         places = {
-            name: (leg, JOINTS[kind])
+            name: (leg, kind)
             for leg in self.legs
             for kind, name in enumerate(self.spec.leg_joints(leg))
         }
-        legs, kinds = zip(*(places.get(name, ("", "")) for name in self.joint_names), strict=True)
-        names = [name.removesuffix("_joint") for name in self.joint_names]
-        return {
-            "joint": ("joint", names),
-            "leg": ("joint", list(legs)),
-            "kind": ("joint", list(kinds)),
-        }
+        return [places.get(name, ("", -1)) for name in self.joint_names]
 
     def of_joint(self, name: str) -> Array:
         """A parameter out of `armature`, `damping` and `coulomb`, by joint, shape (12,)."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from .._checks import file_name, none_or, real, reals, sequence_of, text
+from .._checks import Interval, file_name, none_or, real, reals, sequence_of, text
 from ..errors import FileProblem, InvalidInput
 from ..storage import check_file
 
@@ -63,11 +63,8 @@ class RobotSpec:
                 f"standing has {len(self.standing)} angles; give {len(self.joints)}, for the "
                 f"joints of one leg, or {len(self.joint_names)}, for all legs"
             )
-        object.__setattr__(self, "foot_radius", none_or(real, "foot_radius", self.foot_radius))
-        if self.foot_radius is not None and self.foot_radius < 0.0:
-            raise InvalidInput(
-                f"foot_radius={self.foot_radius}; give a length in metres, 0 for point feet"
-            )
+        radius = none_or(real, "foot_radius", self.foot_radius, Interval(0, unit="m"))
+        object.__setattr__(self, "foot_radius", radius)
 
     def _check_patterns(self) -> None:
         for name in ("joint_pattern", "foot_pattern"):

@@ -5,8 +5,9 @@ Leading dimensions are a batch: `(..., 19)` is one configuration or any batch of
 
 from __future__ import annotations
 
+import math
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from math import isfinite
 from typing import Any
@@ -141,6 +142,24 @@ def as_one(name: str, array: Array) -> Array:
     if array.ndim != 1:
         raise InvalidInput(f"{name} has shape {array.shape}, a batch; pass one state at a time")
     return array
+
+
+def by_state(function: Callable[..., Any], shape: tuple[int, ...], *arrays: Array) -> Array:
+    """What a function of one state gives for a batch, shape (..., *shape).
+
+    Args:
+        function: Takes one row of each array.
+        shape: Shape of its result.
+        arrays: Checked arrays of the same batch, such as q, shape (..., 19).
+    """
+    batch = arrays[0].shape[:-1]
+    if not batch:
+        return np.array(function(*arrays), dtype=np.float64)
+    out = np.empty((math.prod(batch), *shape))
+    rows = zip(*(array.reshape(-1, array.shape[-1]) for array in arrays), strict=True)
+    for k, row in enumerate(rows):
+        out[k] = function(*row)
+    return out.reshape(*batch, *shape)
 
 
 def leg_indices(robot: Robot, feet: Iterable[str] | None) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ Comes in: paths, and what is to be written.
 Goes out: files, and what they hold: text, documents, arrays; or a `FileProblem`.
 """
 
-from .arrays import LARGEST_ARRAYS, StoredArrays, read_arrays, write_arrays
+from .arrays import StoredArrays, read_arrays, write_arrays
 from .json_documents import (
     as_type,
     from_text,
@@ -19,7 +19,6 @@ from .json_documents import (
     read_sealed,
     sealed,
     sha256,
-    unknown_fields,
 )
 from .reading import (
     LARGEST_FILE,
@@ -35,7 +34,6 @@ from .writing import clear_partial_files, partial_path, temporary_folder, write_
 from .xml_files import LARGEST_DOCUMENT, parse_xml, read_xml, refuse_nan
 
 __all__ = [
-    "LARGEST_ARRAYS",
     "LARGEST_DOCUMENT",
     "LARGEST_FILE",
     "REINSTALL",
@@ -59,7 +57,6 @@ __all__ = [
     "sealed",
     "sha256",
     "temporary_folder",
-    "unknown_fields",
     "write_arrays",
     "write_file",
 ]

@@ -46,7 +46,7 @@ def as_type(
         PronkError: What the dataclass itself raises for values that are out of range.
     """
     try:
-        unknown_fields(document, kind)
+        _check_fields(document, kind, complete=False)
         return msgspec.convert(document, kind)
     except (msgspec.ValidationError, RecursionError) as error:
         raise damaged(path, error, remedy, what=what) from error
@@ -67,20 +67,14 @@ def from_text(text: str, kind: type[_T], what: str, remedy: str) -> _T:
     """
     try:
         document = json.loads(text)
-        unknown_fields(document, kind, complete=True)
+        _check_fields(document, kind, complete=True)
         return msgspec.convert(document, kind)
     except (ValueError, RecursionError) as error:
         raise InvalidInput(f"this is not {what} ({error}); {remedy}") from error
 
 
-def unknown_fields(document: object, kind: Any, *, complete: bool = False) -> None:
-    """Refuse fields that a dataclass, or one within it, does not have.
-
-    Args:
-        document: Lists, dictionaries, strings, numbers.
-        kind: The dataclass, or another type.
-        complete: Refuse missing fields too, even those that have a default.
-    """
+def _check_fields(document: object, kind: Any, *, complete: bool) -> None:
+    """Refuse fields that a dataclass, or one within it, does not have; or, if complete, lacks."""
     _compare_fields(document, _type_info(kind), complete)
 
 

@@ -4,7 +4,7 @@ Comes in: motions, gaits, `Results`.
 Goes out: a page, a replay, a film, figures, a report.
 """
 
-from .figure_style import known_format, save_figure
+from .figure_style import known_figure, save_figure
 from .player import Film, LiveServer, play, serve, show, write_film, write_png, write_replay
 from .scenes import Mark, Menu, Scene, Track, gait_scene, library_menu
 
@@ -16,7 +16,7 @@ __all__ = [
     "Scene",
     "Track",
     "gait_scene",
-    "known_format",
+    "known_figure",
     "library_menu",
     "play",
     "save_figure",

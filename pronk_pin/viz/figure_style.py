@@ -160,6 +160,16 @@ def known_format(suffix: str) -> str:
     return suffix
 
 
+def known_figure(path: Path) -> Path:
+    """The path itself, if a figure can be written there in the format of its suffix.
+
+    Raises:
+        InvalidInput: It cannot.
+    """
+    known_format(path.suffix.removeprefix("."))
+    return path
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of a size [in] that lays itself out."""
     return Figure(figsize=(width, height), layout="constrained")

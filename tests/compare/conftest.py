@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from pronk_pin._typing import Array
-from pronk_pin.compare import Experiment, Results, Schedule, Simulation, load_scenario
-from pronk_pin.compare.experiment.run import run_experiment
+from pronk_pin.compare import (
+    Experiment,
+    Results,
+    Schedule,
+    Simulation,
+    load_scenario,
+    run_experiment,
+)
 from pronk_pin.compare.metrics import COLUMNS
 from pronk_pin.control import ControllerSpec
 from pronk_pin.gait import Gait, load_library
@@ -35,6 +43,18 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Results:
     """A small comparison that has been run; tests that change it work on a copy."""
     folder = tmp_path_factory.mktemp("results") / "small"
     return run_experiment(EXPERIMENT, folder, workers=1, progress=False)
+
+
+@pytest.fixture
+def copy(comparison: Results, tmp_path: Path) -> Results:
+    """A copy of the comparison that a test may damage."""
+    folder = shutil.copytree(comparison.folder, tmp_path / "copy")
+    return Results(folder, comparison.experiment)
+
+
+def modified(results: Results) -> dict[str, int]:
+    """When each file of strides was written [ns]."""
+    return {path.name: path.stat().st_mtime_ns for path in results.folder.glob("strides/*.nc")}
 
 
 @pytest.fixture(scope="session")

@@ -47,7 +47,7 @@ def test_where_the_model_is_right_its_torques_replace_the_feedback(
     alone, helped = pronk("pd", None), pronk("model", torque)
 
     for joint in (1, 2):  # thigh, calf
-        before, after = (log.rms_error[:, 2:6, joint::3].mean() for log in (alone, helped))
+        before, after = (log["rms_error"][:, 2:6, joint::3].mean() for log in (alone, helped))
         assert after < 0.25 * before
-    assert alone.scalars["upright"][:, :6].all()
-    assert helped.scalars["upright"][:, :6].all()
+    assert alone["upright"][:, :6].all()
+    assert helped["upright"][:, :6].all()

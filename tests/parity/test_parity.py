@@ -471,7 +471,7 @@ def test_what_is_no_robot_is_refused(robot: Robot, body: str, message: str) -> N
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"states": 0}, "at least one"),
+        ({"states": 0}, "states=0; give a whole number from 1 to 1000000"),
         ({"states": 1.5}, "whole number"),
         ({"tolerance": -1.0}, "from 0 on"),
         ({"tolerance": float("nan")}, "from 0 on"),

@@ -163,7 +163,7 @@ def test_a_biped_with_other_names_is_read_too(biped: Robot) -> None:
         ({"foot_pattern": "{leg}_toe"}, "adapt foot_pattern"),
         ({"base_link": "torso"}, "adapt base_link"),
         ({"standing": (0.9, -1.8)}, "standing has 2 angles; give 3, .* or 12"),
-        ({"foot_radius": -0.02}, "give a length in metres"),
+        ({"foot_radius": -0.02}, "foot_radius=-0.02; give a number from 0 m on"),
     ],
 )
 def test_a_specification_that_does_not_fit_is_explained(

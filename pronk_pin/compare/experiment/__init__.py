@@ -1,35 +1,27 @@
-"""Experiments: cells side by side in any executor, and the folder of their results.
+"""Experiments: what is asked, cell by cell, and what every number of it depends on.
 
-Comes in: an `Experiment` or the name of a suite.
-Goes out: `Results` on disk, with where they are from.
+Comes in: robot, speeds, controllers, scenarios and seeds, or the name of a suite.
+Goes out: an `Experiment`, its cells and their definition, and the strides of a cell.
 """
 
-from .demand import check_demand
-from .executors import known_address
-from .experiment import (
-    DEFAULT_CONTROLLERS,
-    Cell,
-    Experiment,
-    initial_feedforward,
-    run_cell,
-    torque_library,
-)
-from .results import Results, default_folder
-from .run import run_experiment
+from .definition import Definition, cell_definition, define, differences, fingerprint
+from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
+from .initial_feedforward import LIBRARY_VARIABLES, initial_feedforward, torque_library
 from .suites import SUITES, load_suite
 
 __all__ = [
     "DEFAULT_CONTROLLERS",
+    "LIBRARY_VARIABLES",
     "SUITES",
     "Cell",
+    "Definition",
     "Experiment",
-    "Results",
-    "check_demand",
-    "default_folder",
+    "cell_definition",
+    "define",
+    "differences",
+    "fingerprint",
     "initial_feedforward",
-    "known_address",
     "load_suite",
     "run_cell",
-    "run_experiment",
     "torque_library",
 ]

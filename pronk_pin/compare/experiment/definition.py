@@ -48,7 +48,10 @@ def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definit
         "base": experiment.base,
         "mjcf_sha256": mjcf_sha256,
         "schedule": describe(experiment.schedule),
-        "gaits": {repr(speed): experiment.gait(speed).sha256 for speed in experiment.speeds},
+        "gaits": {
+            repr(speed): gait.sha256
+            for speed, gait in zip(experiment.speeds, experiment.gaits, strict=True)
+        },
         "controllers": {
             name: describe(load_controller(name)) for name in sorted({c.controller for c in cells})
         },

@@ -7,7 +7,7 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,30 +17,20 @@ import xarray as xr
 from tyro.conf import Suppress
 
 from ..._checks import instance_of, known_name, path, real, seed, sequence_of, text
-from ...control import (
-    ControllerSpec,
-    InitialFeedforward,
-    TorqueLibrary,
-    load_controller,
-    model_feedforward,
-    phase_grid,
-)
+from ...control import load_controller
 from ...errors import InvalidInput
-from ...gait import SPEEDS, Gait, GaitLibrary, load_library
-from ...robot import BASES, ROBOTS, Robot, load_robot
+from ...gait import SPEEDS, Gait, load_library
+from ...robot import BASES, ROBOTS, load_robot
 from ..identification import explain, identified_gaits
-from ..metrics import steady
 from ..simulation import Progress, Schedule, simulate
 from ..world import load_scenario
 from .definition import cell_definition, define, fingerprint, to_text
+from .initial_feedforward import initial_feedforward, learned_strides
 
 LEARNED = ("library", "identified")
 """Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
 
 DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
-
-LIBRARY_VARIABLES = ("count", "learning", "feedforward", "flight_reference")
-"""What of a learned cell's strides the torque library is made of."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +66,6 @@ class Experiment:
 
     def __post_init__(self) -> None:
         self._check_types()
-        library = _gaits(self.robot, self.base)
         names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
         object.__setattr__(self, "scenarios", names)
         for name in ("speeds", "controllers", "scenarios", "seeds"):
@@ -84,8 +73,7 @@ class Experiment:
             object.__setattr__(self, name, values)  # a list would not equal what is read back
             if len(values) == 0 or len(set(values)) != len(values):
                 raise InvalidInput(f"{name} must name at least one, and none of them twice")
-        for speed in self.speeds:
-            library.at(speed)
+        _ = self.gaits  # there is one of each speed
         for controller in self.controllers:
             if load_controller(controller).source == "identified" and self.base != "locked":
                 raise InvalidInput(
@@ -104,9 +92,10 @@ class Experiment:
             raise InvalidInput("batches must hold each speed once, and none of them may be empty")
         object.__setattr__(self, "batches", batches if len(batches) > 1 else ())
 
-    def gait(self, speed: float) -> Gait:
-        """The gait of a speed [m/s]."""
-        return _gaits(self.robot, self.base).at(speed)
+    @property
+    def gaits(self) -> list[Gait]:
+        """The gait of each speed."""
+        return _gaits(self.robot, self.base, self.speeds)
 
     def extended(self, other: Experiment) -> Experiment:
         """This experiment with the controllers, scenarios, speeds and seeds of another one, too.
@@ -250,11 +239,10 @@ def run_cell(
     """
     instance_of("cell", cell, Cell, "a Cell, one of Experiment.cells()")
     robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.mjcf)
-    library, spec = _gaits(cell.robot, cell.base), load_controller(cell.controller)
-    gaits = [library.at(speed) for speed in cell.speeds]
-    model = robot
+    gaits = _gaits(cell.robot, cell.base, cell.speeds)
+    spec, model = load_controller(cell.controller), robot
     if spec.source == "identified":
-        model = explain(_learned(spec, dependency)).identified
+        model = explain(learned_strides(spec, dependency)).identified
         gaits = identified_gaits(model, gaits) if spec.identified_gaits else gaits
     return simulate(
         robot,
@@ -271,54 +259,10 @@ def run_cell(
     )
 
 
-def _gaits(robot: str, base: str) -> GaitLibrary:
-    """The gaits of a base: of a trunk that may turn those that let it pitch."""
-    return load_library(robot) if base == "locked" else load_library(robot, base="sagittal")
-
-
-def torque_library(strides: xr.Dataset) -> TorqueLibrary:
-    """The torque library learned in a simulation: means over its steady strides (section III.B)."""
-    end = steady(strides)
-    torque = end["feedforward"].interp(phase=phase_grid(), method="cubic")
-    torque = torque.transpose("speed", "stride", "part", "phase", "joint")
-    flight = end["flight_reference"].transpose("speed", "stride")
-    return TorqueLibrary.from_strides(
-        strides["speed"].to_numpy(), torque.to_numpy(), flight.to_numpy()
-    )
-
-
-def initial_feedforward(
-    spec: ControllerSpec,
-    gaits: Sequence[Gait],
-    *,
-    model: Robot,
-    learned: xr.Dataset | None = None,
-    base: str = "locked",
-) -> InitialFeedforward:
-    """Torques that a controller begins with, by the source that its specification names.
-
-    Args:
-        spec: The controller.
-        gaits: The gaits to be played, one for each robot.
-        model: The robot as the model knows it: the identified one where that is the source.
-        learned: Strides of the learning that a torque library is made of.
-        base: How the trunk may move.
-
-    Raises:
-        InvalidInput: The torques are to be learned ones, and there are no strides.
-    """
-    if spec.source in ("model", "identified"):
-        return InitialFeedforward(model_feedforward(model, gaits, base=base))
-    if spec.source == "library":
-        library = torque_library(_learned(spec, learned))
-        return library.initial_feedforward(np.array([gait.speed for gait in gaits]))
-    return InitialFeedforward()
-
-
-def _learned(spec: ControllerSpec, dependency: xr.Dataset | None) -> xr.Dataset:
-    if dependency is None:
-        raise InvalidInput(f"controller '{spec.name}' begins with what 'ilc' has learned; run it")
-    return dependency
+def _gaits(robot: str, base: str, speeds: tuple[float, ...]) -> list[Gait]:
+    """The gaits of a base at some speeds: of a trunk that may turn those that let it pitch."""
+    library = load_library(robot) if base == "locked" else load_library(robot, base="sagittal")
+    return [library.at(speed) for speed in speeds]
 
 
 def _attributes(cell: Cell) -> dict[str, str | int | float]:

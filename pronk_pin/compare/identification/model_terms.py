@@ -169,6 +169,10 @@ TERMS: tuple[Term, ...] = (
 """The terms that are looked for by default."""
 
 
+_JOINT_TERMS = {"armature": "armature", "damping": "damping", "coulomb": "Coulomb"}
+"""Fields of `ModelParameters` and `Scenario`, and their terms, by the name after the joint's."""
+
+
 def parameters(values: Mapping[str, float], robot: Robot) -> ModelParameters:
     """Convert the terms' parameters to those that `Robot.with_parameters` takes.
 
@@ -182,11 +186,7 @@ def parameters(values: Mapping[str, float], robot: Robot) -> ModelParameters:
     """
     by_joint = {
         field: tuple(values.get(f"{joint} {name}", 0.0) for joint in JOINTS)
-        for field, name in (
-            ("armature", "armature"),
-            ("damping", "damping"),
-            ("coulomb", "Coulomb"),
-        )
+        for field, name in _JOINT_TERMS.items()
     }
     payload = values.get("payload", 0.0)
     moment = np.array([values.get(f"trunk moment {axis}", 0.0) for axis in "xyz"])
@@ -210,11 +210,7 @@ def truth(scenario: Scenario) -> dict[str, float]:
     by_joint = {
         f"{joint} {name}": getattr(scenario, field)
         for joint in JOINTS
-        for field, name in (
-            ("armature", "armature"),
-            ("damping", "damping"),
-            ("coulomb", "Coulomb"),
-        )
+        for field, name in _JOINT_TERMS.items()
     }
     x, _, z = scenario.payload_position
     return {

@@ -32,8 +32,8 @@ from .recording import PARTS
 
 SAMPLES = 41
 """Samples of the phase."""
-FRICTION = 0.6
-"""Friction coefficient of the model's torques."""
+MODEL_FRICTION = 0.6
+"""Friction coefficient that the model's torques are distributed with; the scenario has its own."""
 BOUNCE = 0.03
 """Time after touchdown in which the feet bounce [s]."""
 OTHERS = ("gravity", "deviation", "internal forces", "unexplained")
@@ -67,7 +67,7 @@ def shares(
     torque = np.full((len(causes), *shape), np.nan)
     for k, (gait, by_part) in enumerate(zip(gaits, phases, strict=True)):
         reference = feedforward(
-            robot, gait, contact="rolling", friction=FRICTION, constraint=PLANAR_CONSTRAINT
+            robot, gait, contact="rolling", friction=MODEL_FRICTION, constraint=PLANAR_CONSTRAINT
         )
         for part, phase in by_part.items():
             at = (k, PARTS.index(part))
@@ -146,7 +146,7 @@ def _apart(
     by_cause["internal forces"] = internal
     by_cause["unexplained"] = moving - needed - columns.sum(axis=0)
     spread = recording.torque[:, :-1].std(axis=0)
-    return [commanded, model, spread, commanded - ahead, *by_cause.values()]
+    return [commanded, model, spread, commanded - ahead, *(by_cause[cause] for cause in causes)]
 
 
 def _on_grid(phase: PhaseForces, values: Array, planned: float) -> Array:

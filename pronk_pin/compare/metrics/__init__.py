@@ -8,18 +8,24 @@ from .metrics import (
     COLUMNS,
     KEYS,
     STEADY_STRIDES,
+    VARIABLES,
+    CellSummary,
     by_joint,
     feedback_share,
+    join_summaries,
+    peak_history,
     reduction,
     settling_stride,
     steady,
     strides_to_converge,
     summarize,
+    summarize_cell,
 )
 from .paper_table import table_1
 from .statistics import (
     CONFIDENCE,
     LEAST_UNITS,
+    NO_INTERVAL,
     Interval,
     compare_controllers,
     compare_pairs,
@@ -34,12 +40,10 @@ from .statistics import (
 from .time_to_beat import (
     LEARNER,
     RIVAL,
-    VARIABLES,
     PeakHistory,
     beat_rows,
     beaten,
     lessons,
-    peak_history,
 )
 
 __all__ = [
@@ -48,9 +52,11 @@ __all__ = [
     "KEYS",
     "LEARNER",
     "LEAST_UNITS",
+    "NO_INTERVAL",
     "RIVAL",
     "STEADY_STRIDES",
     "VARIABLES",
+    "CellSummary",
     "Interval",
     "PeakHistory",
     "beat_rows",
@@ -62,6 +68,7 @@ __all__ = [
     "family",
     "feedback_share",
     "in_family",
+    "join_summaries",
     "lessons",
     "mean_interval",
     "peak_history",
@@ -72,6 +79,7 @@ __all__ = [
     "steady",
     "strides_to_converge",
     "summarize",
+    "summarize_cell",
     "table_1",
     "unit_of",
 ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TypeAlias
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -14,6 +14,7 @@ from ..._typing import Array, BoolArray
 from ...control import SKIPPED
 from ...robot import JOINTS
 from .effort import effort
+from .time_to_beat import JUDGED, PeakHistory, beat_rows
 
 STEADY_STRIDES = 30
 """Strides at the end of a simulation that count as steady state (paper, section III.B)."""
@@ -24,6 +25,9 @@ SETTLED = 0.1
 LEAST_IMPROVEMENT = 0.05
 """Share of the error that learning must take away for there to be anything that settles; a robot
 that learns nothing still drifts by a percent."""
+
+VARIABLES = ("count", "start", "peak_error", "learning", "upright")
+"""Variables of the strides that `peak_history` reads."""
 
 KEYS = ["robot", "base", "scenario", "speed", "controller", "seed", "joint", "metric"]
 COLUMNS = [*KEYS, "value", "unit"]
@@ -89,7 +93,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
         power, cost_of_transport: Mechanical, see `compare.metrics.effort`.
 
     Args:
-        strides: What `Simulation` recorded, as `compare.experiment.results` stores it.
+        strides: What `Simulation` recorded; the same from memory and from its file.
     """
     if strides.sizes["stride"] == 0:
         strides = strides.reindex(stride=[0])  # of nobody
@@ -225,6 +229,47 @@ def settling_stride(peak: Array, before: float, final: float) -> float:
     if outside.size == 0:
         return 1.0
     return float(outside[-1] + 2) if outside[-1] + 1 < peak.size else float("nan")
+
+
+def peak_history(strides: xr.Dataset) -> PeakHistory:
+    """Read a simulation's `PeakHistory`."""
+    names = ("robot", "base", "scenario", "controller")
+    peaks = by_joint(strides["peak_error"]).sel(joint=list(JUDGED))
+    peaks = peaks.transpose("speed", "stride", "joint")
+    level = by_joint(steady(strides)["peak_error"]).mean("stride").sel(joint=list(JUDGED))
+    count = strides["count"].to_numpy()
+    on = strides["learning"].to_numpy() == 1
+    return PeakHistory(
+        {**{name: strides.attrs[name] for name in names}, "seed": int(strides.attrs["seed"])},
+        strides["speed"].to_numpy(),
+        tuple(peaks.to_numpy()[k, : count[k]][on[k, : count[k]]] for k in range(len(count))),
+        level.transpose("speed", "joint").to_numpy(),
+        strides["upright"].transpose("speed", "stride").min("stride").to_numpy()
+        if strides.sizes["stride"]
+        else np.full(len(count), np.nan),
+    )
+
+
+class CellSummary(NamedTuple):
+    """What one simulation gives to the summary of its experiment."""
+
+    rows: pd.DataFrame
+    """Its own rows: see `summarize`."""
+    peaks: PeakHistory
+    """What its rows relative to another simulation are made of."""
+
+
+def summarize_cell(strides: xr.Dataset) -> CellSummary:
+    """Compute what one simulation gives to the summary of its experiment."""
+    return CellSummary(summarize(strides), peak_history(strides))
+
+
+def join_summaries(cells: Iterable[CellSummary]) -> pd.DataFrame:
+    """The summary of an experiment: the rows of each simulation, and those relative to another."""
+    cells = list(cells)
+    relative = pd.DataFrame(beat_rows([cell.peaks for cell in cells]), columns=COLUMNS)
+    full = [table for table in (*(cell.rows for cell in cells), relative) if len(table)]
+    return pd.concat(full).sort_values(KEYS, ignore_index=True)[COLUMNS]
 
 
 def reduction(summary: pd.DataFrame, metric: str) -> pd.DataFrame:

@@ -52,9 +52,18 @@ class Interval(NamedTuple):
     high: float
     """Upper end."""
 
+    @property
+    def known(self) -> bool:
+        """Whether there is one."""
+        return bool(np.isfinite([self.low, self.high]).all())
+
     def holds(self, value: float) -> bool:
         """Whether a value lies in the interval."""
         return self.low <= value <= self.high
+
+
+NO_INTERVAL = Interval(float("nan"), float("nan"), float("nan"))
+"""That of what there is not."""
 
 
 class Comparison(NamedTuple):
@@ -228,7 +237,7 @@ def _bootstrap(
 ) -> Interval:
     """BCa bootstrap over units that belong together across the arrays."""
     if data[0].size == 0:
-        return Interval(np.nan, np.nan, np.nan)
+        return NO_INTERVAL
     value = float(statistic(*data, axis=-1))
     if data[0].size < 2:
         return Interval(value, np.nan, np.nan)
@@ -254,7 +263,7 @@ def _wilson(shares: Array) -> Interval:
     """Interval of a share from its values by unit; a bootstrap of all ones would be sure of 1."""
     n = shares.size
     if n == 0:
-        return Interval(np.nan, np.nan, np.nan)
+        return NO_INTERVAL
     z, share = float(stats.norm.ppf(0.5 + CONFIDENCE / 2)), float(shares.mean())
     centre = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * np.sqrt(share * (1 - share) / n + z * z / (4 * n * n))

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
 from ..._typing import Array
 from ...control import SKIPPED
-from .metrics import by_joint, steady
 
 RIVAL = "model"
 """The controller that learning has to beat."""
@@ -21,9 +19,6 @@ LEARNER = "ilc"
 
 JUDGED = ("calf", "thigh")
 """Joints whose error counts."""
-
-VARIABLES = ("count", "start", "peak_error", "learning", "upright")
-"""Variables of the strides that `peak_history` reads."""
 
 WINDOW = 5
 """Strides whose mean error is compared, so that one lucky or unlucky stride decides nothing."""
@@ -42,25 +37,6 @@ class PeakHistory(NamedTuple):
     """Their means in steady state [rad], shape (n, 2)."""
     upright: Array
     """1 for robots that never fell, NaN for those that finished no stride, shape (n,)."""
-
-
-def peak_history(strides: xr.Dataset) -> PeakHistory:
-    """Read a simulation's `PeakHistory`."""
-    names = ("robot", "base", "scenario", "controller")
-    peaks = by_joint(strides["peak_error"]).sel(joint=list(JUDGED))
-    peaks = peaks.transpose("speed", "stride", "joint")
-    level = by_joint(steady(strides)["peak_error"]).mean("stride").sel(joint=list(JUDGED))
-    count = strides["count"].to_numpy()
-    on = strides["learning"].to_numpy() == 1
-    return PeakHistory(
-        {**{name: strides.attrs[name] for name in names}, "seed": int(strides.attrs["seed"])},
-        strides["speed"].to_numpy(),
-        tuple(peaks.to_numpy()[k, : count[k]][on[k, : count[k]]] for k in range(len(count))),
-        level.transpose("speed", "joint").to_numpy(),
-        strides["upright"].transpose("speed", "stride").min("stride").to_numpy()
-        if strides.sizes["stride"]
-        else np.full(len(count), np.nan),
-    )
 
 
 def strides_to_beat(peaks: Array, level: float) -> float:
@@ -85,7 +61,7 @@ def strides_to_beat(peaks: Array, level: float) -> float:
     return float(first + np.argmax(peaks[first:] < level) + 1)
 
 
-def beat_rows(histories: list[PeakHistory]) -> Iterator[dict[str, object]]:
+def beat_rows(histories: Sequence[PeakHistory]) -> Iterator[dict[str, object]]:
     """Rows of the summary: `strides_to_beat_model` of every robot that learned.
 
     For calf and thigh, and `-` for the later of the two; only where the model's feedforward was

@@ -6,7 +6,8 @@ Goes out: tables and text for a terminal and for the report.
 
 from .difference import format_changes
 from .limitations import limitations
-from .tables import SHOWN, SHOWN_PARAMETERS, answer, beside_the_paper, sampled_scenarios
+from .overview import ControllerOverview, JointOverview, Overview, answer, overview
+from .tables import SHOWN, SHOWN_PARAMETERS, beside_the_paper, sampled_scenarios
 from .verdict import (
     against_model,
     answer_in_words,
@@ -15,6 +16,7 @@ from .verdict import (
     between,
     families,
     format_suite,
+    format_summary,
     format_tables,
     number,
     units_of_intervals,
@@ -24,6 +26,9 @@ from .verdict import (
 __all__ = [
     "SHOWN",
     "SHOWN_PARAMETERS",
+    "ControllerOverview",
+    "JointOverview",
+    "Overview",
     "against_model",
     "answer",
     "answer_in_words",
@@ -34,9 +39,11 @@ __all__ = [
     "families",
     "format_changes",
     "format_suite",
+    "format_summary",
     "format_tables",
     "limitations",
     "number",
+    "overview",
     "sampled_scenarios",
     "units_of_intervals",
     "verdict",

@@ -9,8 +9,8 @@ import pandas as pd
 from scipy import stats
 
 from ...errors import InvalidInput
-from ..experiment import Results
-from ..metrics import compare_pairs, family, robots
+from ..metrics import Interval, compare_pairs, family, robots
+from ..results import Results
 from .tables import SHOWN
 from .verdict import between, number
 
@@ -31,9 +31,9 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     too, whatever the errors do.
 
     Returns:
-        A row each scenario, controller and joint: `before`, `after` [rad], `difference` with `_low`
-        and `_high`, `p` (adjusted), `robots` compared, `fallen_before`, `fallen_after`, and
-        `change`: "better", "worse" or "".
+        A row each scenario, controller and joint: `before`, `after` [rad], `difference` and its
+        interval from `low` to `high`, `p` (adjusted), `robots` compared, `fallen_before`,
+        `fallen_after`, and `change`: "better", "worse" or "".
 
     Raises:
         InvalidInput: Nothing is in both.
@@ -113,8 +113,8 @@ def _row(
         "before": float(np.nanmean(other.to_numpy())) if pairs.size else np.nan,
         "after": float(np.nanmean(one.to_numpy())) if pairs.size else np.nan,
         "difference": found.difference.value,
-        "difference_low": found.difference.low,
-        "difference_high": found.difference.high,
+        "low": found.difference.low,
+        "high": found.difference.high,
         "p": _sign_flips(pairs),
         "robots": pairs.size,
         "fallen_before": fallen[1],
@@ -162,7 +162,7 @@ def _short(value: object) -> str:
 
 def _line(key: Any, row: pd.Series) -> str:
     world, controller, joint = key
-    interval = between(row, "difference", "+.4f")
+    interval = between(Interval(row["difference"], row["low"], row["high"]), "+.4f")
     fell = row["fallen_after"] - row["fallen_before"]
     falls = f" ({fell:+d} fell)" if fell else ""
     return (

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 
 from ..metrics import LEARNER, in_family, lessons
+from .overview import Overview
 from .tables import SHOWN
 
 _NAMES = {"pd": "PD", "model": "the model's feedforward"}
 
 
-def inconclusive(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame, against: str) -> str:
+def inconclusive(summary: pd.DataFrame, *, scenario: str, table: Overview, against: str) -> str:
     """Why nothing is concluded of learning in a world, as a clause; empty where something is.
 
     Args:
@@ -23,14 +26,13 @@ def inconclusive(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame, a
     return _untaught(in_family(summary, scenario)) or _unpaired(table, against)
 
 
-def unsaid(table: pd.DataFrame) -> str:
-    """Why an experiment has no verdict, from the table of `answer`.
+def unsaid(tables: Mapping[str, Overview]) -> str:
+    """Why an experiment has no verdict, from its `answer`.
 
     A verdict takes PD and learning, and the model's feedforward too where there are several worlds.
     """
-    controllers = table.index.get_level_values("controller")
-    several = table.index.get_level_values("scenario").nunique() > 1
-    needed = ["pd", LEARNER, "model"] if several else ["pd", LEARNER]
+    controllers = {name for table in tables.values() for name in table}
+    needed = ["pd", LEARNER, "model"] if len(tables) > 1 else ["pd", LEARNER]
     missing = [name for name in needed if name not in controllers]
     return f"There is no verdict: it takes {' and '.join(missing)}, which did not run."
 
@@ -49,15 +51,15 @@ def _untaught(summary: pd.DataFrame) -> str:
     return f"learning learned from none of its {found.strides} strides of learning ({counted})"
 
 
-def _unpaired(table: pd.DataFrame, against: str) -> str:
+def _unpaired(table: Overview, against: str) -> str:
     """Whether there is no robot whose errors under the two can be compared."""
     other = _NAMES[against]
-    down = [name for name in (LEARNER, against) if not table.loc[name, "upright"]]
+    down = [name for name in (LEARNER, against) if not table[name].upright]
     if down:
         names = " and under ".join({LEARNER: "learning", against: other}[name] for name in down)
         return f"no robot stayed up under {names}"
-    compared = "reduction" if against == "pd" else "difference"
-    values = [float(table.loc[LEARNER, f"{joint}_{compared}"]) for joint in SHOWN]
-    if np.isfinite(values).all():
+    joints = [table[LEARNER].joints[joint] for joint in SHOWN]
+    compared = [joint.reduction if against == "pd" else joint.difference for joint in joints]
+    if np.isfinite([interval.value for interval in compared]).all():
         return ""
     return f"no robot has an error to compare under both learning and {other}"

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from ...control import SKIPPED, load_controller
-from ..experiment import Results
 from ..metrics import CONFIDENCE, LEAST_UNITS, family, robots, sampled, table_1, unit_of
+from ..results import Results
 from .tables import SHOWN
 
 _STEADY_APEX = 0.004

@@ -8,29 +8,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..._typing import Array
 from ...robot import JOINTS
-from ..metrics import (
-    RIVAL,
-    Interval,
-    beaten,
-    compare_controllers,
-    family,
-    in_family,
-    lessons,
-    mean_interval,
-    robots,
-    table_1,
-    unit_of,
-)
+from ..metrics import in_family, robots, table_1
 from ..world import load_scenario
 
 SHOWN = ("calf", "thigh")
 """Joints of the paper's Table I."""
-
-_MOVING = 0.05
-"""Speed from which on a robot goes somewhere, so that its transport has a cost [m/s]."""
-
 
 SHOWN_PARAMETERS = {
     "payload": ("payload [kg]", 1.0, ".1f"),
@@ -115,98 +98,6 @@ def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
                 table[joint, source, "reduction"] = 1.0 - ratio
     order = itertools.product(SHOWN, ("ours", "paper"), ("PD", "ILC", "reduction"))
     return table[[name for name in order if name in table]].rename_axis("speed")
-
-
-def overview(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
-    """One row a controller, in the order of the calf's error: what it reaches, and how sure it is.
-
-    Means are over the robots that did not fall, of all speeds and seeds; a column with `_low` and
-    `_high` beside it has an interval. With `j` for `calf` and `thigh`, the columns are
-
-    - `j`: mean peak error [rad], with interval; `j_rms`: mean RMS error [rad];
-    - `j_reduction`: of the mean peak against PD's, with interval;
-    - `j_model`: 1 where it is better than the model's feedforward beyond doubt, -1 where it is
-      worse, 0 where the interval of the difference holds 0, NaN without a robot that stayed up
-      under both;
-    - `j_difference`: of the mean peak from the model's, pair by pair [rad], with interval;
-    - `j_wins`: share of the robots that have a smaller error than with the model, with interval;
-    - `beat_strides`, `beat`, `learners`: strides of learning until calf and thigh beat the model
-      (median over the robots that do), how many do, of how many;
-    - `strides`: to converge, the slowest robot; NaN if one does not, or falls;
-    - `taught`: strides that something was learned from; NaN without learning;
-    - `feedback`: its share of the torque; `cost`: mean cost of transport of the robots that move;
-    - `speed_error` [m/s], `apex_error` [m]: mean magnitudes;
-    - `upright`: robots that stayed up; `fell`: robots that did not; `robots`: how many there were,
-      with those that finished no stride, of which neither is known;
-    - `unit`: what the intervals are drawn over, see `compare.metrics.statistics`.
-
-    Args:
-        summary: See `compare.metrics`.
-        scenario: A scenario, or a family of sampled ones.
-    """
-    family_rows = in_family(summary, scenario)
-    names = [str(name) for name in family_rows["controller"].unique()]
-    rows = {name: _row(family_rows, scenario, name, rivals=set(names) - {name}) for name in names}
-    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("controller")
-    return table.sort_values("calf", ascending=False)
-
-
-def answer(summary: pd.DataFrame) -> pd.DataFrame:
-    """The overviews of all scenarios, indexed by scenario and controller, in the summary's
-    order."""
-    families = list(dict.fromkeys(map(family, summary["scenario"].unique())))
-    return pd.concat(
-        {name: overview(summary, scenario=name) for name in families}, names=["scenario"]
-    )
-
-
-def _row(summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[str]) -> Any:
-    """A controller's row of `overview`."""
-    cell: dict[str, Any] = {"scenario": scenario, "controller": controller}
-
-    own = summary[summary["controller"] == controller]
-
-    def values(metric: str, joint: str = "-") -> Array:
-        values_of_robots = robots(own, **cell, metric=metric, joint=joint)
-        return np.asarray(values_of_robots.to_numpy(dtype=float)).ravel()
-
-    row: dict[str, Any] = {}
-    for joint in SHOWN:
-        row |= _interval(joint, mean_interval(robots(own, **cell, joint=joint)))
-        row[f"{joint}_rms"] = _mean(values("rms_error", joint))
-        if "pd" in rivals:
-            comparison = compare_controllers(summary, **cell, against="pd", joint=joint)
-            row |= _interval(f"{joint}_reduction", comparison.reduction)
-        if RIVAL in rivals:
-            comparison = compare_controllers(summary, **cell, against=RIVAL, joint=joint)
-            sign = {True: 1, None: 0, False: -1}[comparison.better]
-            row[f"{joint}_model"] = sign if comparison.pairs else np.nan
-            row |= _interval(f"{joint}_difference", comparison.difference)
-            row |= _interval(f"{joint}_wins", comparison.improvement)
-    settled = values("strides_to_converge")
-    row["strides"] = float(settled.max()) if settled.size else np.nan
-    found_lessons = lessons(summary, controller=controller)
-    row["taught"] = np.nan if found_lessons is None else found_lessons.taught
-    row["beat_strides"], row["beat"], row["learners"] = beaten(summary, controller=controller)
-    row["feedback"] = _mean(values("feedback_share"))
-    cost = robots(own, **cell, metric="cost_of_transport", joint="-")
-    row["cost"] = _mean(cost.loc[:, np.abs(cost.columns.to_numpy(float)) > _MOVING].to_numpy(float))
-    row["speed_error"] = _mean(np.abs(values("speed_error")))
-    row["apex_error"] = _mean(np.abs(values("apex_error")))
-    upright = own[own["metric"] == "upright"]["value"]
-    row["upright"], row["fell"] = int((upright == 1.0).sum()), int((upright == 0.0).sum())
-    row["robots"] = len(upright)
-    row["unit"] = unit_of(robots(own, **cell, metric="upright", joint="-"))
-    return row
-
-
-def _interval(name: str, interval: Interval) -> dict[str, float]:
-    return {name: interval.value, f"{name}_low": interval.low, f"{name}_high": interval.high}
-
-
-def _mean(values: Array) -> float:
-    """Mean of what there is; NaN without anything."""
-    return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
 
 
 def worst_reduction(summary: pd.DataFrame, *, scenario: str, controller: str) -> dict[str, float]:

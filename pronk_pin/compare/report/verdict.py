@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from ..metrics import CONFIDENCE, LEARNER, control_arm, family, in_family
+from ..metrics import CONFIDENCE, LEARNER, Interval, control_arm, family, in_family
 from .inconclusive import inconclusive, unsaid
-from .tables import SHOWN, answer, beside_the_paper, overview, sampled_scenarios, worst_reduction
+from .overview import ControllerOverview, Overview, answer, overview
+from .tables import SHOWN, beside_the_paper, sampled_scenarios, worst_reduction
 
 _WIDTH = 100
 
 
-def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None = None) -> str:
+def verdict(summary: pd.DataFrame, *, scenario: str, table: Overview | None = None) -> str:
     """The answer for one scenario in words; empty without `pd` and `ilc`.
 
     Where there is nothing to answer from, it says so, and why.
@@ -27,20 +28,18 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
         table: Its `overview`, if it is there already.
     """
     table = overview(summary, scenario=scenario) if table is None else table
-    if not {"pd", LEARNER} <= set(table.index):
+    if not {"pd", LEARNER} <= set(table):
         return ""
     if reason := inconclusive(summary, scenario=scenario, table=table, against="pd"):
         return _joined(f"Nothing is concluded: {reason}.", _fallen(table), _control_arm(summary))
-    learning = table.loc[LEARNER]
-    if learning["unit"] == "scenario":
+    learning = table[LEARNER]
+    if learning.unit == "scenario":
         return _sampled_verdict(summary, scenario, table)
     worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
-    less = " and ".join(
-        f"{_percent(learning, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
-    )
+    less = _less(learning)
     settled = (
-        f", within {_count(int(learning['strides']), 'stride')} at every speed."
-        if np.isfinite(learning["strides"])
+        f", within {_count(int(learning.settled), 'stride')} at every speed."
+        if np.isfinite(learning.settled)
         else "; at some speed it has not settled."
     )
     sentences = [
@@ -49,27 +48,31 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: pd.DataFrame | None 
     ]
     if reason := _no_rival(summary, scenario, table):
         sentences.append(reason)
-    elif "model" in table.index:
-        sentences.append(_against_the_model(learning, table.loc["model"]))
+    elif "model" in table:
+        sentences.append(_against_the_model(learning, table["model"]))
     return _joined(*sentences, _fallen(table), _control_arm(summary))
 
 
-def _no_rival(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) -> str:
+def _less(learning: ControllerOverview) -> str:
+    """Reduction of the mean peaks against PD."""
+    parts = (f"{_percent(learning.joints[joint].reduction)} in the {joint}" for joint in SHOWN)
+    return " and ".join(parts)
+
+
+def _no_rival(summary: pd.DataFrame, scenario: str, table: Overview) -> str:
     """Why nothing is concluded against the model; empty where something is, or it was not run."""
-    if "model" not in table.index:
+    if "model" not in table:
         return ""
     reason = inconclusive(summary, scenario=scenario, table=table, against="model")
     return f"Against the model's feedforward nothing is concluded: {reason}." if reason else ""
 
 
-def _sampled_verdict(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) -> str:
+def _sampled_verdict(summary: pd.DataFrame, scenario: str, table: Overview) -> str:
     """The answer for a family of sampled scenarios, each of which counts once."""
-    learning, drawn = table.loc[LEARNER], in_family(summary, scenario)
+    learning, drawn = table[LEARNER], in_family(summary, scenario)
     scenarios, speeds = drawn["scenario"].nunique(), drawn["speed"].nunique()
     worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
-    less = " and ".join(
-        f"{_percent(learning, f'{joint}_reduction')} in the {joint}" for joint in SHOWN
-    )
+    less = _less(learning)
     sentences = [
         f"In {scenarios} sampled scenarios, at {_count(speeds, 'speed')} in each, learning cuts "
         f"the mean peak error by {less} against PD ({worst['calf']:.0%} and {worst['thigh']:.0%} "
@@ -77,67 +80,70 @@ def _sampled_verdict(summary: pd.DataFrame, scenario: str, table: pd.DataFrame) 
     ]
     if reason := _no_rival(summary, scenario, table):
         sentences.append(reason)
-    elif "model" in table.index:
+    elif "model" in table:
         sentences += _against_the_model_by_scenario(summary, scenario, table)
     return _joined(*sentences, _fallen(table), _control_arm(summary))
 
 
 def _against_the_model_by_scenario(
-    summary: pd.DataFrame, scenario: str, table: pd.DataFrame
+    summary: pd.DataFrame, scenario: str, table: Overview
 ) -> Iterator[str]:
-    learning, model = table.loc[LEARNER], table.loc["model"]
+    learning, model = table[LEARNER], table["model"]
     by_scenario = sampled_scenarios(summary, scenario=scenario)
-    signs = [int(learning[f"{joint}_model"]) for joint in SHOWN]
-    if set(signs) == {1}:
+    better = [learning.joints[joint].better for joint in SHOWN]
+    if all(better):
         yield "It beats the model's feedforward in calf and thigh beyond doubt."
     else:
-        said = {1: "beats", 0: "cannot be told from", -1: "does worse than"}
+        said = {True: "beats", None: "cannot be told from", False: "does worse than"}
         parts = [
-            f"{said[s]} the model's feedforward in the {j}"
-            for j, s in zip(SHOWN, signs, strict=True)
+            f"{said[which]} the model's feedforward in the {joint}"
+            for joint, which in zip(SHOWN, better, strict=True)
         ]
         yield f"It {' and '.join(parts)}."
     for joint in SHOWN:
-        change, low, high = (
-            1e3 * learning[f"{joint}_difference{end}"] for end in ("", "_low", "_high")
-        )
+        own = learning.joints[joint]
+        change, low, high = (1e3 * end for end in own.difference)
         both = by_scenario[joint][[LEARNER, "model"]].dropna()
         ahead = int((both[LEARNER] < both["model"]).sum())
         yield (
-            f"The {joint}'s mean peak is {1e3 * learning[joint]:.1f} against "
-            f"{1e3 * model[joint]:.1f} mrad, by paired differences {change:+.1f} mrad ({low:+.1f} "
+            f"The {joint}'s mean peak is {1e3 * own.peak.value:.1f} against "
+            f"{1e3 * model.joints[joint].peak.value:.1f} mrad, by paired differences "
+            f"{change:+.1f} mrad ({low:+.1f} "
             f"to {high:+.1f}); it is less in {ahead} of {_count(len(both), 'scenario')}, and the "
-            f"probability that a robot improves is {_percent(learning, f'{joint}_wins')}."
+            f"probability that a robot improves is {_percent(own.wins)}."
         )
-    if learning["beat"] > 0:
+    beat = learning.beat
+    if beat.robots:
         yield (
-            f"{learning['beat']:.0f} of {learning['learners']:.0f} robots come to beat the model "
-            "in both joints and stay there, after "
-            f"{learning['beat_strides']:.0f} strides in the median."
+            f"{beat.robots} of {beat.learners} robots come to beat the model "
+            f"in both joints and stay there, after {beat.strides:.0f} strides in the median."
         )
 
 
-def _against_the_model(learning: pd.Series, model: pd.Series) -> str:
-    wins = [joint for joint in SHOWN if learning[f"{joint}_model"] > 0]
-    open_ = [joint for joint in SHOWN if learning[f"{joint}_model"] == 0]
+def _against_the_model(learning: ControllerOverview, model: ControllerOverview) -> str:
+    wins = [joint for joint in SHOWN if learning.joints[joint].better]
+    open_ = [joint for joint in SHOWN if learning.joints[joint].better is None]
     beats = "beats" if wins else "does not beat"
     where = f" in the {wins[0]} only" if len(wins) == 1 else ""
     doubt = f" (in the {' and '.join(open_)} the difference may be chance)" if open_ else ""
     numbers = ", ".join(
-        f"{learning[joint]:.4f} against {model[joint]:.4f} rad in the {joint}" for joint in SHOWN
+        f"{learning.joints[joint].peak.value:.4f} against {model.joints[joint].peak.value:.4f} rad "
+        f"in the {joint}"
+        for joint in SHOWN
     )
     text = f"It {beats} the model's feedforward{where}{doubt}: {numbers}."
-    if learning["beat"] > 0:
+    beat = learning.beat
+    if beat.robots:
         text += (
-            f" {learning['beat']:.0f} of {learning['learners']:.0f} robots beat it in both joints, "
-            f"after {learning['beat_strides']:.0f} strides in the median."
+            f" {beat.robots} of {beat.learners} robots beat it in both joints, "
+            f"after {beat.strides:.0f} strides in the median."
         )
     return text
 
 
-def _fallen(table: pd.DataFrame) -> str:
-    fallen, robots = int(table["fell"].sum()), int(table["robots"].sum())
-    idle = robots - fallen - int(table["upright"].sum())
+def _fallen(table: Overview) -> str:
+    fallen, robots = sum(row.fell for row in table.values()), sum(r.robots for r in table.values())
+    idle = robots - fallen - sum(row.upright for row in table.values())
     if fallen == robots:
         return f"All {_count(robots, 'robot')} fell."
     counted = {0: "No robot", 1: "One robot"}
@@ -158,78 +164,74 @@ def _control_arm(summary: pd.DataFrame) -> str:
     )
 
 
-def suite_verdict(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -> str:
+def suite_verdict(summary: pd.DataFrame, *, tables: Mapping[str, Overview] | None = None) -> str:
     """The answer for all scenarios in words; empty without `pd`, `ilc` and `model`.
 
     Args:
         summary: See `compare.metrics`.
-        table: Its `answer`, if it is there already.
+        tables: Its `answer`, if it is there already.
     """
-    table = answer(summary) if table is None else table
-    controllers = set(table.index.get_level_values("controller"))
-    if not {"pd", LEARNER, "model"} <= controllers:
+    tables = answer(summary) if tables is None else tables
+    if not {"pd", LEARNER, "model"} <= {name for table in tables.values() for name in table}:
         return ""
-    learning = table.xs(LEARNER, level="controller")
+    learning = {world: table[LEARNER] for world, table in tables.items() if LEARNER in table}
     reasons = {
-        str(world): inconclusive(
-            summary, scenario=str(world), table=table.loc[world], against="model"
-        )
-        for world in learning.index
+        world: inconclusive(summary, scenario=world, table=tables[world], against="model")
+        for world in learning
     }
-    told = learning.loc[[world for world, reason in reasons.items() if not reason]]
+    told = {world: row for world, row in learning.items() if not reasons[world]}
     sentences = [
         f"Does practice beat the model? In {_count(len(learning), 'scenario')}, against the "
         f"model's feedforward, by {CONFIDENCE:.0%} intervals of the paired difference:"
     ]
-    sentences += _where_it_beats_the_model(told) if len(told) else []
+    sentences += _where_it_beats_the_model(told) if told else []
     sentences += [
         f"In {world} nothing is concluded: {reason}." for world, reason in reasons.items() if reason
     ]
     sentences += _range_against_pd(told)
-    return _joined(*sentences, _where_robots_fell(table), _control_arm(summary))
+    return _joined(*sentences, _where_robots_fell(tables), _control_arm(summary))
 
 
-def _where_it_beats_the_model(learning: pd.DataFrame) -> Iterator[str]:
-    """What learning does in those worlds that tell, one a row."""
+def _where_it_beats_the_model(learning: Overview) -> Iterator[str]:
+    """What learning does in those worlds that tell, by world."""
     for joint in SHOWN:
         better, worse, open_ = (
-            list(learning.index[learning[f"{joint}_model"] == sign]) for sign in (1, -1, 0)
+            [world for world, row in learning.items() if row.joints[joint].better is which]
+            for which in (True, False, None)
         )
         parts = [f"In the {joint} it is better in {len(better)} of {len(learning)}"]
         parts += [f"worse in {', '.join(worse)}"] if worse else []
         parts += [f"open in {', '.join(open_)}"] if open_ else []
         yield "; ".join(parts) + "."
-    beat, learners = learning["beat"].sum(), learning["learners"].sum()
-    median = learning["beat_strides"].median()
+    beat = sum(row.beat.robots for row in learning.values())
+    learners = sum(row.beat.learners for row in learning.values())
+    strides = [row.beat.strides for row in learning.values() if row.beat.robots]
     yield (
-        f"{beat:.0f} of {learners:.0f} robots come to beat it in both joints and stay there"
-        + (f", the scenarios' median is {median:.0f} strides." if beat else ".")
+        f"{beat} of {learners} robots come to beat it in both joints and stay there"
+        + (f", the scenarios' median is {np.median(strides):.0f} strides." if beat else ".")
     )
 
 
-def _range_against_pd(learning: pd.DataFrame) -> Iterator[str]:
+def _range_against_pd(learning: Overview) -> Iterator[str]:
     """The least and the greatest reduction against PD, and in which scenarios."""
     for joint in SHOWN:
-        reduced = learning[f"{joint}_reduction"].dropna()
-        if reduced.empty:
+        found = {world: row.joints[joint].reduction for world, row in learning.items()}
+        found = {world: less for world, less in found.items() if np.isfinite(less.value)}
+        if not found:
             continue
-        best, least = reduced.idxmax(), reduced.idxmin()
+        best, least = (end(found, key=lambda world: found[world].value) for end in (max, min))
         yield (
-            f"Against PD the {joint}'s mean peak is less by "
-            f"{_percent(learning.loc[least], f'{joint}_reduction')} in {least}"
-            + (
-                f" to {_percent(learning.loc[best], f'{joint}_reduction')} in {best}."
-                if len(reduced) > 1
-                else "."
-            )
+            f"Against PD the {joint}'s mean peak is less by {_percent(found[least])} in {least}"
+            + (f" to {_percent(found[best])} in {best}." if len(found) > 1 else ".")
         )
 
 
-def _where_robots_fell(table: pd.DataFrame) -> str:
-    down = table[table["fell"] > 0]
+def _where_robots_fell(tables: Mapping[str, Overview]) -> str:
     places = [
-        f"{row['fell']:.0f} of {row['robots']:.0f} in {scenario} under {controller}"
-        for (scenario, controller), row in down.iterrows()
+        f"{row.fell} of {row.robots} in {scenario} under {controller}"
+        for scenario, table in tables.items()
+        for controller, row in table.items()
+        if row.fell
     ]
     return f"Robots fell: {', '.join(places)}." if places else "No robot fell."
 
@@ -238,40 +240,47 @@ def _joined(*sentences: str) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def answer_in_words(summary: pd.DataFrame, *, table: pd.DataFrame | None = None) -> str:
+def answer_in_words(summary: pd.DataFrame, *, tables: Mapping[str, Overview] | None = None) -> str:
     """The verdict over one scenario or all of them, or why the experiment cannot have one.
 
     Args:
         summary: See `compare.metrics`.
-        table: Its `answer`, if it is there already.
+        tables: Its `answer`, if it is there already.
     """
-    table = answer(summary) if table is None else table
-    worlds = list(dict.fromkeys(table.index.get_level_values("scenario")))
-    if len(worlds) > 1:
-        said = suite_verdict(summary, table=table)
+    tables = answer(summary) if tables is None else tables
+    if len(tables) > 1:
+        said = suite_verdict(summary, tables=tables)
     else:
-        said = verdict(summary, scenario=worlds[0], table=table.loc[worlds[0]])
-    return said or _joined(unsaid(table), _where_robots_fell(table))
+        ((scenario, table),) = tables.items()
+        said = verdict(summary, scenario=scenario, table=table)
+    return said or _joined(unsaid(tables), _where_robots_fell(tables))
+
+
+def format_summary(summary: pd.DataFrame) -> str:
+    """Tables and verdict as text for a terminal: `format_tables` of one scenario, `format_suite` of
+    many."""
+    worlds = families(list(summary["scenario"].unique()))
+    return format_suite(summary) if len(worlds) > 1 else format_tables(summary, scenario=worlds[0])
 
 
 def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
     """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
-    table = answer(in_family(summary, scenario))
+    tables = answer(in_family(summary, scenario))
     single = bool((summary["scenario"] == scenario).any())
-    mine = table.loc[scenario]
+    mine = tables[scenario]
     parts = [
         _format_beside(beside_the_paper(summary, scenario=scenario)) if single else "",
         beside_note(mine) if single else "",
         format_overview(mine),
-        textwrap.fill(answer_in_words(in_family(summary, scenario), table=table), _WIDTH),
+        textwrap.fill(answer_in_words(in_family(summary, scenario), tables=tables), _WIDTH),
     ]
     return "\n\n".join(part for part in parts if part)
 
 
-def beside_note(table: pd.DataFrame) -> str:
+def beside_note(table: Overview) -> str:
     """Who is missing beside the paper's Table I, from an `overview`; empty if nobody is."""
-    mine = table.loc[[name for name in ("pd", LEARNER) if name in table.index]]
-    robots, missing = int(mine["robots"].sum()), int((mine["robots"] - mine["upright"]).sum())
+    mine = [table[name] for name in ("pd", LEARNER) if name in table]
+    robots, missing = sum(row.robots for row in mine), sum(row.robots - row.upright for row in mine)
     if not missing:
         return ""
     if missing == robots:
@@ -283,11 +292,9 @@ def beside_note(table: pd.DataFrame) -> str:
 
 def format_suite(summary: pd.DataFrame) -> str:
     """The overviews of all scenarios and the verdict over them, as text for a terminal."""
-    table = answer(summary)
-    parts = []
-    for scenario in dict.fromkeys(table.index.get_level_values("scenario")):
-        parts.append(f"{scenario}\n{format_overview(table.loc[scenario])}")
-    return "\n\n".join([*parts, textwrap.fill(answer_in_words(summary, table=table), _WIDTH)])
+    tables = answer(summary)
+    parts = [f"{scenario}\n{format_overview(table)}" for scenario, table in tables.items()]
+    return "\n\n".join([*parts, textwrap.fill(answer_in_words(summary, tables=tables), _WIDTH)])
 
 
 def _format_beside(table: pd.DataFrame) -> str:
@@ -309,7 +316,7 @@ def _format_beside(table: pd.DataFrame) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
-def format_overview(table: pd.DataFrame) -> str:
+def format_overview(table: Overview) -> str:
     """An `overview` as text: peaks with their intervals, and against the model."""
     lines = [
         f"{'':>10}  {'calf: peak [rad]':^23} {'thigh: peak [rad]':^23}  beats model  strides to"
@@ -317,53 +324,54 @@ def format_overview(table: pd.DataFrame) -> str:
         f"{'controller':>10}  {'mean':>6} {'95 % interval':>16} {'mean':>6} {'95 % interval':>16}  "
         f"{'calf/thigh':>11}  {'beat it':>10}  {'share':>6}  {'transp.':>7}  upright",
     ]
-    for name, row in table.iterrows():
+    for name, row in table.items():
+        peaks = [row.joints[joint].peak for joint in SHOWN]
         cells = " ".join(
-            f"{number(row[joint], '.4f'):>6} {between(row, joint, '.4f'):>16}" for joint in SHOWN
+            f"{number(peak.value, '.4f'):>6} {between(peak, '.4f'):>16}" for peak in peaks
         )
         lines.append(
             f"{name:>10}  {cells}  {against_model(row):>11}  {beat_text(row):>10}  "
-            f"{number(row['feedback'], '.0%'):>6}  {number(row['cost'], '.2f'):>7}  "
-            f"{row['upright']:.0f} of {row['robots']:.0f}"
+            f"{number(row.feedback, '.0%'):>6}  {number(row.cost, '.2f'):>7}  "
+            f"{row.upright} of {row.robots}"
         )
     if units := units_of_intervals(table):
         lines.append(f"{'':>10}  intervals over the {units}")
     return "\n".join(lines)
 
 
-def units_of_intervals(table: pd.DataFrame) -> str:
+def units_of_intervals(table: Overview) -> str:
     """What the intervals of an `overview` are drawn over, in words; empty where there are none."""
-    ends = table[[f"{joint}_low" for joint in SHOWN]]
-    units = sorted(set(table["unit"][ends.notna().any(axis="columns")]))
-    return " and ".join(f"{unit}s" for unit in units)
+    units = {row.unit for row in table.values() if any(j.peak.known for j in row.joints.values())}
+    return " and ".join(f"{unit}s" for unit in sorted(units))
 
 
-def against_model(row: pd.Series) -> str:
+def against_model(row: ControllerOverview) -> str:
     """Whether calf and thigh are better than with the model's feedforward: yes, no, or open.
 
     A dash where no robot stayed up under both, and of learning that nothing taught.
     """
-    signs = [row.get(f"{joint}_model", np.nan) for joint in SHOWN]
-    if row.get("taught", np.nan) == 0 or np.isnan(signs).any():
+    joints = [row.joints[joint] for joint in SHOWN]
+    if row.taught == 0 or not all(joint.pairs for joint in joints):
         return "-"
-    return "/".join({1: "yes", 0: "open", -1: "no"}[int(row[f"{joint}_model"])] for joint in SHOWN)
+    return "/".join({True: "yes", None: "open", False: "no"}[joint.better] for joint in joints)
 
 
-def beat_text(row: pd.Series) -> str:
+def beat_text(row: ControllerOverview) -> str:
     """Strides until the model is beaten, and by how many robots; "never" where by none."""
-    if not row["learners"] or row.get("taught", np.nan) == 0:
+    beat = row.beat
+    if not beat.learners or row.taught == 0:
         return "-"
-    if not row["beat"]:
+    if not beat.robots:
         return "never"
-    everyone = row["beat"] == row["learners"]
-    few = "" if everyone else f" ({row['beat']:.0f}/{row['learners']:.0f})"
-    return f"{row['beat_strides']:.0f}{few}"
+    few = "" if beat.robots == beat.learners else f" ({beat.robots}/{beat.learners})"
+    return f"{beat.strides:.0f}{few}"
 
 
-def between(row: pd.Series, name: str, form: str) -> str:
+def between(interval: Interval, form: str) -> str:
     """An interval, as "0.0210 to 0.0232"; a dash without one."""
-    ends = row.get(f"{name}_low", np.nan), row.get(f"{name}_high", np.nan)
-    return f"{ends[0]:{form}} to {ends[1]:{form}}" if np.isfinite(ends).all() else "-"
+    if not interval.known:
+        return "-"
+    return f"{interval.low:{form}} to {interval.high:{form}}"
 
 
 def number(value: float, form: str) -> str:
@@ -371,10 +379,9 @@ def number(value: float, form: str) -> str:
     return format(value, form) if np.isfinite(value) else "-"
 
 
-def _percent(row: pd.Series, name: str) -> str:
-    ends = row[f"{name}_low"], row[f"{name}_high"]
-    interval = f" ({100 * ends[0]:.0f} to {ends[1]:.0%})" if np.isfinite(ends).all() else ""
-    return f"{row[name]:.0%}{interval}"
+def _percent(share: Interval) -> str:
+    ends = f" ({100 * share.low:.0f} to {share.high:.0%})" if share.known else ""
+    return f"{share.value:.0%}{ends}"
 
 
 def _count(n: int, noun: str) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from ... import control
 from ..._typing import Array, BoolArray, IntArray
 from ...control import (
     PARTS,
@@ -22,13 +22,7 @@ from ...control import (
 from ...gait import Gait
 from ...robot import NL, rotation_matrix
 from ..world import Motion
-
-_EVERY = 4
-SAMPLES = (control.SAMPLES - 1) // _EVERY + 1
-"""Samples of the phase grid on which strides are kept: every fourth one of the control's."""
-
-LAST = 12
-"""Strides at the end that are kept tick by tick."""
+from .quantities import EVERY, LAST, SAMPLES, STRIDE_QUANTITIES, TICK_QUANTITIES
 
 SHORTEST_STRIDE = 0.5
 """Strides shorter than this share of the planned duration do not occur: it sizes the log."""
@@ -56,12 +50,6 @@ class TickLog:
 
     def __init__(self, n: int, size: int, *, turns: bool = True, inertial: bool = False) -> None:
         self.size, self.turns, self.inertial = size, turns, inertial
-        self._states = ["joints", "joint_rates", "base", "base_rate", "force"]
-        self._torques = ["feedback", "feedforward", "missing"]
-        if turns:
-            self._states += ["pose", "twist"]
-            self._torques += ["balance"]
-        self._readings = ["specific_force"] if inertial else []
         self.specific_force = np.zeros((n, size, 3))
         self.joints, self.joint_rates = np.zeros((2, n, size, NL))
         self.feedback, self.feedforward, self.missing, self.balance = np.zeros((4, n, size, NL))
@@ -69,12 +57,21 @@ class TickLog:
         self.force = np.zeros((n, size, NL // 3, 3))
         self.pose, self.twist = np.zeros((n, size, 7)), np.zeros((n, size, 6))
         self.pose[..., 6] = 1.0  # level, until something else is written
+        self._torques = [self.feedback, self.feedforward, self.missing]
+        self._torques += [self.balance] if turns else []
+        self._channels = [*self._torques, self.joints, self.joint_rates]
+        self._channels += [self.base, self.base_rate, self.force]
+        self._channels += [self.pose, self.twist] if turns else []
+        self._channels += [self.specific_force] if inertial else []
 
     def write(self, rows: IntArray, tick: int, motion: Motion) -> None:
         """Write a motion of robots from a tick on."""
-        at, ticks = _compact(rows), slice(tick, tick + motion.base.shape[1])
-        for name in self._states:
-            getattr(self, name)[at, ticks] = getattr(motion, name)
+        at = _compact(rows), slice(tick, tick + motion.base.shape[1])
+        self.joints[at], self.joint_rates[at] = motion.joints, motion.joint_rates
+        self.base[at], self.base_rate[at] = motion.base, motion.base_rate
+        self.force[at] = motion.force
+        if motion.pose is not None and motion.twist is not None:
+            self.pose[at], self.twist[at] = motion.pose, motion.twist
 
     def torques(
         self, rows: IntArray, tape: Tape, gains: Gains, tau_max: Array, played: int
@@ -103,8 +100,8 @@ class TickLog:
 
     def take_torques(self, rows: IntArray, other: TickLog) -> None:
         """Copy the torques of another log."""
-        for name in self._torques:
-            getattr(self, name)[rows] = getattr(other, name)[rows]
+        for torque, others in zip(self._torques, other._torques, strict=True):
+            torque[rows] = others[rows]
 
     def phase(self, rows: IntArray, length: IntArray, *, sensed: int = 0) -> PhaseLog:
         """Make the controller's log of a phase that has ended after so many ticks (m,).
@@ -137,8 +134,7 @@ class TickLog:
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
         """Move the ticks from `start` (m,) on to the beginning, as the first of the next phase."""
         kept = start[:, None] + np.arange(ticks)  # (m, ticks)
-        for name in (*self._states, *self._torques, *self._readings):
-            channel = getattr(self, name)
+        for channel in self._channels:
             channel[rows, :ticks] = channel[rows[:, None], kept]
 
 
@@ -152,73 +148,55 @@ def _compact(rows: IntArray) -> IntArray | slice:
 class StrideLog:
     """The strides of n robots, numbered from 0; a stride goes from touchdown to touchdown.
 
+    Its arrays are those of `STRIDE_QUANTITIES`, `log["peak_error"]` for instance, whose first axes
+    are n robots and strides, NaN where a stride has not come so far; and those of
+    `TICK_QUANTITIES`, see `ticks`.
+
+    Args:
+        gaits: The gait of each robot.
+        duration: How long is simulated [s].
+        timestep: Length of a tick [s].
+
     Attributes:
         count: Strides that each robot has finished, shape (n,).
-        scalars: Quantities of a stride by name, each of shape (n, strides); NaN where none.
-        peak_error: Peak of the stance error [rad], shape (n, strides, 12).
-        rms_error: Root mean square of the stance error [rad], shape (n, strides, 12).
-        contact_error: Peak from the contact on, before it was felt [rad], shape (n, strides, 12).
-        curves: The `error` [rad], `feedback` and `feedforward` [N m] of stance and flight, each of
-            shape (n, strides, 2, samples, 12).
-        base: Trunk x, z [m], shape (n, strides, 2, samples, 2).
-        attitude: Trunk roll, pitch, heading [rad], shape (n, strides, 2, samples, 3).
     """
-
-    SCALARS = (
-        *("start", "duration", "stance", "speed", "apex", "upright", "learning", "skipped"),
-        *("heading", "tilt", "flight_reference"),
-    )
-    CURVES = ("error", "feedback", "feedforward")
-    TICKS: ClassVar = {
-        "joints": (NL,),
-        "joint_rates": (NL,),
-        "torque": (NL,),
-        "feedforward": (NL,),
-        "base": (2,),
-        "base_rate": (2,),
-        "force": (NL // 3, 3),
-    }
-    """Channels of the last strides that are kept at every tick, with the shape of one tick."""
 
     def __init__(self, gaits: Sequence[Gait], duration: float, timestep: float) -> None:
         n = len(gaits)
         parts = [[getattr(gait, part).duration for gait in gaits] for part in PARTS]
         self._planned = np.array(parts)  # (2, n)
         whole = self._planned.sum(axis=0)
-        size = int(np.ceil(duration / (SHORTEST_STRIDE * whole.min()))) + 1
         self._timestep = timestep
         self._grid = phase_grid(SAMPLES)
         self._begin_x = np.zeros(n)
         self.count = np.zeros(n, dtype=np.intp)
-        self.scalars = {name: np.full((n, size), np.nan) for name in self.SCALARS}
-        self.peak_error, self.rms_error, self.contact_error = np.full((3, n, size, NL), np.nan)
-        shape = (n, size, len(PARTS), SAMPLES)
-        self.curves = {name: np.full((*shape, NL), np.nan, np.float32) for name in self.CURVES}
-        self.base = np.full((*shape, 2), np.nan, np.float32)
-        self.attitude = np.full((*shape, 3), np.nan, np.float32)
-        # Strides are kept in turn, and only near the end of the simulation.
+        # Ticks are kept in turn, and only near the end of the simulation.
         self._near = (LAST + 1) * LONGEST_PART * whole
         self._close = np.zeros(n, dtype=bool)
+        self._strides = int(np.ceil(duration / (SHORTEST_STRIDE * whole.min()))) + 1
         ticks = int(np.ceil(LONGEST_PART * self._planned.max() / timestep))
-        shape = (n, LAST, len(PARTS), ticks)
-        self._ticks = {
-            name: np.full((*shape, *shape_of_tick), np.nan, np.float32)
-            for name, shape_of_tick in self.TICKS.items()
-        }
+        sizes = {"speed": n, "stride": self._strides, "tick": ticks}
+        self._arrays = {each.name: each.empty(sizes) for each in STRIDE_QUANTITIES}
+        self._ticks = {each.name: each.empty(sizes) for each in TICK_QUANTITIES}
+
+    def __getitem__(self, name: str) -> npt.NDArray[np.floating[Any]]:
+        """The array of a quantity of the strides."""
+        return self._arrays[name]
 
     def begin(self, rows: IntArray, start: Array, learning: BoolArray, *, remaining: Array) -> None:
         """Begin strides at the times `start` (m,) [s], with `remaining` (m,) [s] to go."""
         at = (rows, self.count[rows])
-        self.scalars["start"][at], self.scalars["learning"][at] = start, learning
+        self["start"][at], self["learning"][at] = start, learning
         self._close[rows] = remaining < self._near[rows]
 
     def stance(self, rows: IntArray, record: StrideRecord, log: TickLog, length: IntArray) -> None:
         """Log a stance of so many ticks (m,)."""
         at = (rows, self.count[rows])
-        self.peak_error[at] = np.abs(record.error).max(axis=1)
-        self.rms_error[at] = np.sqrt(np.mean(record.error**2, axis=1))
-        self.contact_error[at] = np.maximum(self.peak_error[at], record.contact_error)
-        self.scalars["stance"][at] = length * self._timestep
+        peak = np.abs(record.error).max(axis=1)
+        self["peak_error"][at] = peak
+        self["rms_error"][at] = np.sqrt(np.mean(record.error**2, axis=1))
+        self["contact_error"][at] = np.maximum(peak, record.contact_error)
+        self["stance"][at] = length * self._timestep
         self._begin_x[rows] = log.base[rows, 0, 0]
         self._keep(0, rows, record, log, length)
 
@@ -227,7 +205,7 @@ class StrideLog:
         ticks = np.arange(int(length.max()))
         height = log.base[_compact(rows), : len(ticks), 1]
         highest = np.where(ticks < length[:, None], height, -np.inf).max(axis=1)
-        self.scalars["apex"][rows, self.count[rows]] = highest
+        self["apex"][rows, self.count[rows]] = highest
         self._keep(1, rows, record, log, length)
 
     def _keep(
@@ -235,25 +213,33 @@ class StrideLog:
     ) -> None:
         """Curves of a part of the strides, and its ticks where the end is near."""
         at = (rows, self.count[rows], part)
-        for name in self.CURVES:
-            self.curves[name][at] = getattr(record, name)[:, ::_EVERY]
+        self["error"][at] = record.error[:, ::EVERY]
+        self["feedback"][at] = record.feedback[:, ::EVERY]
+        self["feedforward"][at] = record.feedforward[:, ::EVERY]
         index = self._grid * self._planned[part, rows, None] / self._timestep
         index = np.minimum(index, length[:, None] - 1.0)
-        self.base[at] = resample(log.base[_compact(rows), : int(length.max())], index)
-        self.attitude[at] = log.attitude(rows, length, index)
+        self["base"][at] = resample(log.base[_compact(rows), : int(length.max())], index)
+        self["attitude"][at] = log.attitude(rows, length, index)
         close = self._close[rows]
         if close.any():
             self._keep_ticks(part, rows[close], log, length[close])
 
     def _keep_ticks(self, part: int, rows: IntArray, log: TickLog, length: IntArray) -> None:
-        slot, size = self.count[rows] % LAST, self._ticks["base"].shape[3]
-        ticks = slice(min(int(length.max()), size))
+        slot, size = self.count[rows] % LAST, self._ticks["tick_base"].shape[3]
+        at = _compact(rows), slice(min(int(length.max()), size))
+        values = {
+            "tick_joints": log.joints[at],
+            "tick_joint_rates": log.joint_rates[at],
+            "tick_torque": log.torque(rows, at[1]),
+            "tick_feedforward": log.feedforward[at],
+            "tick_base": log.base[at],
+            "tick_base_rate": log.base_rate[at],
+            "tick_force": log.force[at],
+        }
         who, beyond = np.nonzero(np.arange(size) >= length[:, None])
-        at = _compact(rows), ticks
-        for name, store in self._ticks.items():
-            values = log.torque(rows, ticks) if name == "torque" else getattr(log, name)[at]
-            store[rows, slot, part, ticks] = values
-            store[rows[who], slot[who], part, beyond] = np.nan
+        for name, array in self._ticks.items():
+            array[rows, slot, part, at[1]] = values[name]
+            array[rows[who], slot[who], part, beyond] = np.nan
 
     def end(
         self,
@@ -280,17 +266,17 @@ class StrideLog:
             flight_reference: How long the reference of the flight lasted [s].
         """
         at = (rows, self.count[rows])
-        self.scalars["duration"][at] = duration
-        self.scalars["speed"][at] = (x - self._begin_x[rows]) / duration
-        self.scalars["upright"][at] = upright
-        self.scalars["skipped"][at] = skipped
-        self.scalars["tilt"][at], self.scalars["heading"][at] = tilt, heading
-        self.scalars["flight_reference"][at] = flight_reference
-        self.count[rows] = np.minimum(self.count[rows] + 1, self.scalars["start"].shape[1] - 1)
+        self["duration"][at] = duration
+        self["mean_speed"][at] = (x - self._begin_x[rows]) / duration
+        self["upright"][at] = upright
+        self["skipped"][at] = skipped
+        self["tilt"][at], self["heading"][at] = tilt, heading
+        self["flight_reference"][at] = flight_reference
+        self.count[rows] = np.minimum(self.count[rows] + 1, self._strides - 1)
 
     def finish(self, upright: BoolArray) -> None:
         """End the log; a fall in an unfinished stride counts for the last finished one."""
-        self.scalars["upright"][np.arange(len(upright)), np.maximum(self.count - 1, 0)] = upright
+        self["upright"][np.arange(len(upright)), np.maximum(self.count - 1, 0)] = upright
 
     def ticks(self) -> dict[str, Array]:
         """The last strides at every tick, by name: shape (n, last, 2, ticks, ...), oldest first.
@@ -300,6 +286,6 @@ class StrideLog:
         order = (self.count[:, None] + np.arange(LAST)) % LAST  # (n, last)
         rows = np.arange(len(order))[:, None]
         sorted_ = {name: store[rows, order] for name, store in self._ticks.items()}
-        used = np.isfinite(sorted_["base"]).any(axis=(0, 1, 2, 4))
+        used = np.isfinite(sorted_["tick_base"]).any(axis=(0, 1, 2, 4))
         length = int(np.flatnonzero(used).max(initial=0)) + 1
         return {name: values[:, :, :, :length] for name, values in sorted_.items()}

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 
-import numpy as np
-
-from ...control import PARTS
 from ...errors import InvalidInput
 from ...gait import Gait
-from ...robot import NL
-from .log import SAMPLES, SHORTEST_STRIDE, StrideLog
+from .log import SHORTEST_STRIDE
+from .quantities import STRIDE_QUANTITIES
 
 _COPIES = 3
 """A finished log, the dataset that is made of it, and its file are in memory together."""
@@ -23,11 +21,8 @@ def log_size(gaits: Sequence[Gait], duration: float) -> float:
     """Memory that the strides of robots take with these gaits, over a duration [s], in bytes."""
     shortest = min(gait.duration for gait in gaits)
     strides = duration / (SHORTEST_STRIDE * shortest) + 1.0
-    curves = len(PARTS) * SAMPLES * (len(StrideLog.CURVES) * NL + 2 + 3)  # base, attitude
-    stride = (
-        curves * np.dtype(np.float32).itemsize
-        + (len(StrideLog.SCALARS) + 3 * NL) * np.dtype(np.float64).itemsize
-    )
+    one = {"speed": 1, "stride": 1}
+    stride = sum(math.prod(each.shape(one)) * each.dtype.itemsize for each in STRIDE_QUANTITIES)
     return len(gaits) * strides * stride
 
 

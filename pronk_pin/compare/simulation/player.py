@@ -1,8 +1,4 @@
-"""Player of tapes: n robots in their world, until a tape ends or a touchdown is sensed.
-
-Where the law is affine servos play whole tapes; where the motors are late, as many ticks at once as
-they are; else the feedback is computed tick by tick.
-"""
+"""Player of tapes: n robots in their world, until a tape ends or a touchdown is sensed."""
 
 from __future__ import annotations
 
@@ -12,34 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..._typing import Array, IntArray
-from ...control import (
-    AttitudeEstimator,
-    Balance,
-    ControllerSpec,
-    PhaseLog,
-    Tape,
-    TouchdownDetector,
-    TrunkEstimate,
-    clip_torque,
-    phase_grid,
-)
+from ...control import Balance, ControllerSpec, PhaseLog, Tape, TouchdownDetector
 from ...gait import Gait
-from ...robot import Robot, rotation_matrix
-from ..world import InertialUnit, Motion, Motors, Scenario, SensorSuite, World, finite
+from ...robot import Robot
+from ..world import Motion, Motors, Scenario, SensorSuite, World, level_specific_force
+from .fall import FallDetector
 from .log import TickLog
-
-_EXPECTED_TOUCHDOWN = 0.9
-"""Phase of flight up to which it is played in one go."""
-
-_CHUNK = 8
-"""Ticks that are played in one go from then on; what comes after a touchdown is thrown away."""
-
-_FALLEN = 0.6
-"""Trunk height, over that of the gait's lowest point, below which a robot has fallen."""
-
-
-_TUMBLED = np.cos(np.radians(45.0))
-"""Cosine of the angle between the trunk's axis and the vertical beyond which it has fallen."""
+from .playback import DelayedPlayback, FeedbackPlayback, Playback, Segment, ServoPlayback
 
 
 class Player:
@@ -63,6 +38,7 @@ class Player:
         motors, sensors: Theirs.
         log: The phase that they are in, as it truly is.
         sensed: The same as the robots know it: the log itself, where nothing is noisy.
+        falls: Detects falls.
         upright: Which robots have not fallen, shape (n,).
     """
 
@@ -79,39 +55,29 @@ class Player:
         balance: Balance | None,
         chunked: bool,
     ) -> None:
-        n, dt = len(gaits), scenario.timestep
-        turns = balance is not None
-        chunked = chunked and not turns
-        self._gains, self._tau_max = spec.gains, robot.tau_max
-        self._servos = chunked and scenario.affine
-        # Ticks whose torques are known beforehand.
-        self._ahead = scenario.delay_ticks if chunked and scenario.foreseeable else 0
-        servo = spec.gains if self._servos else None
+        n, level = len(gaits), balance is None
+        known = chunked and level and scenario.foreseeable  # torques, before they act
+        servo = spec.gains if known and scenario.affine else None
         self.world = World(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
         self.sensors = SensorSuite(scenario.sensors, n, rng)
-        self.log = self.sensed = TickLog(n, ticks, turns=turns)
-        self._level_imu = spec.imu and balance is None  # read a phase at a time
-        self._inertial = None  # read at each tick
-        if balance is not None and spec.imu:
-            self._inertial = InertialUnit(self.world, self.sensors)
-            self._estimator = AttitudeEstimator(
-                spec.attitude_filter,
-                balance.at_touchdown,
-                self._inertial.at_rest(spec.attitude_filter.rest),
-                timestep=dt,
-                gravity=float(np.linalg.norm(scenario.gravity_vector)),
-            )
-        if not self._servos and not self._ahead:
-            inertial = self._inertial is not None
-            self.sensed = TickLog(n, ticks, turns=turns, inertial=inertial)
-        self._balance = balance
-        self._touchdown_delay = spec.touchdown_ticks
+        self.log = TickLog(n, ticks, turns=not level)
         flight = np.array([gait.flight.duration for gait in gaits])
-        self._touchdown = TouchdownDetector(spec.contact, robot, flight, timestep=dt)
-        self._expected = np.round(_EXPECTED_TOUCHDOWN * flight / dt).astype(np.intp)
-        heights = [gait.stance.base_reference(phase_grid())[0][:, 1] for gait in gaits]
-        self._floor = _FALLEN * np.min(heights, axis=1)
+        self._playback: Playback
+        if servo is not None:
+            self._playback = ServoPlayback(self.world, servo, self.log, flight)
+        elif known and scenario.delay_ticks:
+            self._playback = DelayedPlayback(self.world, self.motors, spec.gains, self.log)
+        else:
+            self._playback = FeedbackPlayback(
+                self.world, self.motors, self.sensors, spec, balance=balance, ticks=ticks
+            )
+        self.sensed = self._playback.sensed
+        self._gains, self._balance = spec.gains, balance
+        self._level_imu = spec.imu and level  # read a phase at a time
+        self._touchdown_delay = spec.touchdown_ticks
+        self._touchdown = TouchdownDetector(spec.contact, robot, flight, timestep=scenario.timestep)
+        self.falls = FallDetector(gaits)
         self.upright = np.ones(n, dtype=bool)
 
     def play(self, rows: IntArray, tape: Tape, *, part: int | None) -> IntArray:
@@ -125,116 +91,30 @@ class Player:
         Returns:
             How many ticks were played, shape (m,).
         """
-        world, log, sensed = self.world, self.log, self.sensed
+        playback, log, sensed = self._playback, self.log, self.sensed
         airborne = part == 1
-        setpoints = tape.setpoint(self._gains) if self._servos else None
         played, tick, going = tape.length.copy(), tape.begin, np.arange(len(rows))
         while going.size:
             who, end = rows[going], int(tape.length[going].max())
-            stop = min(self._next_stop(who, tick, airborne), end)
+            stop = min(playback.next_stop(who, tick, part), end)
             if stop > tape.ticks:
                 tape = tape.held(end)
-                setpoints = setpoints if setpoints is None else tape.setpoint(self._gains)
-            if setpoints is not None:
-                motion = measured = world.play(who, setpoints[going, tick:stop])
-            elif self._ahead:
-                motion = measured = world.play(who, self.motors.coming(who, stop - tick))
-            else:
-                encoders = self.sensors.encoders(who, world.joints[who], world.joint_rates[who])
-                trunk = self._estimated_trunk(who)
-                torque = self._torque(who, encoders, trunk, tape, going, tick, part)
-                torque = self.motors.drive(who, torque, world.joint_rates[who])
-                motion = world.play(who, torque[:, None])
-                measured = self._measured_motion(who, motion, encoders, trunk)
-                if trunk is not None and sensed.inertial:
-                    sensed.specific_force[who, tick] = trunk.specific_force
-                sensed.write(who, tick, measured)
+            segment = Segment(who, _excerpt(tape, going, slice(tick, stop)), tick, part)
+            motion, measured = playback.play(segment)
             log.write(who, tick, motion)
             played[going] = self._ends(who, measured, tick, tape.length[going], airborne)
             count = np.minimum(played[going], stop) - tick
-            world.advance(who, motion, count)
-            if self._ahead:
-                self.motors.command(who, self._asked(motion, tape, going, tick), count)
+            self.world.advance(who, motion, count)
+            playback.advanced(segment, motion, count)
             self._restart_broken(who)
             going, tick = going[played[going] > stop], stop
         if airborne:
             played = np.maximum(played, 1 + self._touchdown_delay)  # even if it broke before
-        sensed.torques(rows, tape, self._gains, self._tau_max, int(played.max()))
+        tau_max = self.world.robot.tau_max
+        sensed.torques(rows, tape, self._gains, tau_max, int(played.max()))
         if sensed is not log:
             log.take_torques(rows, sensed)
         return played
-
-    def _next_stop(self, rows: IntArray, tick: int, airborne: bool) -> int:
-        """Tick up to which to play in one go, if the tapes do not end before."""
-        if not self._servos:
-            return tick + max(self._ahead, 1)
-        if not airborne:
-            return self.log.size
-        expected = int(self._expected[rows].min())
-        return expected if tick < expected else tick + _CHUNK
-
-    def _asked(self, motion: Motion, tape: Tape, going: IntArray, tick: int) -> Array:
-        """Commanded torques along a motion from a tick on [N m], shape (m, ticks, 12)."""
-        ticks = slice(tick, tick + motion.joints.shape[1])
-        feedback = self._gains.feedback(
-            tape.position[going, ticks] - motion.joints,
-            tape.velocity[going, ticks] - motion.joint_rates,
-        )
-        return clip_torque(feedback, tape.feedforward[going, ticks], self._tau_max)
-
-    def _torque(
-        self,
-        rows: IntArray,
-        encoders: tuple[Array, Array],
-        trunk: TrunkEstimate | None,
-        tape: Tape,
-        going: IntArray,
-        tick: int,
-        part: int | None,
-    ) -> Array:
-        """Commanded torques at one tick, the balance's included [N m], shape (m, 12)."""
-        joints, rates = encoders
-        feedback = self._gains.feedback(
-            tape.position[going, tick] - joints, tape.velocity[going, tick] - rates
-        )
-        if self._balance is not None and trunk is not None:
-            balance = np.zeros_like(feedback)
-            if part is not None:
-                balance = self._balance.torque(
-                    part, rows, tick, trunk[:2], joints, tape.position[going, tick]
-                )
-            self.sensed.balance[rows, tick] = balance
-            feedback = feedback + balance
-        return clip_torque(feedback, tape.feedforward[going, tick], self._tau_max)
-
-    def _estimated_trunk(self, rows: IntArray) -> TrunkEstimate | None:
-        """Estimated state of trunks that may turn: by the IMU, or without one the true state."""
-        if self._balance is None:
-            return None
-        if self._inertial is not None:
-            gyro, force = self._inertial.read(rows)
-            self._estimator.update(rows, gyro, force)
-            return self._estimator.trunk(rows, force)
-        return TrunkEstimate(
-            self.world.pose[rows], self.world.twist[rows], np.zeros((len(rows), 3))
-        )
-
-    def _measured_motion(
-        self,
-        rows: IntArray,
-        motion: Motion,
-        encoders: tuple[Array, Array],
-        trunk: TrunkEstimate | None,
-    ) -> Motion:
-        """One tick's motion as the robots measure it."""
-        joints, rates = encoders
-        if trunk is not None:
-            motion = motion._replace(pose=trunk.pose[:, None], twist=trunk.twist[:, None])
-        return motion._replace(
-            joints=joints[:, None],
-            joint_rates=rates[:, None],
-            force=self.sensors.feet(rows, motion.force),
-        )
 
     def _ends(
         self, rows: IntArray, motion: Motion, tick: int, length: IntArray, airborne: bool
@@ -248,19 +128,17 @@ class Player:
         over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
         if airborne:
             over |= self._touchdown.felt(rows, motion.force, count)
-        if not finite(motion.path[:, -1]).all():  # what is not finite stays so
-            over |= ~finite(motion.path[:, 1:])
+        if self.falls.broken(motion.path[:, -1]).any():
+            over |= self.falls.broken(motion.path[:, 1:])
         ended = over.any(axis=1)
         ends[ended] = count[np.argmax(over[ended], axis=1)]
-        too_low = motion.base[..., 1] < self._floor[rows, None]
-        if motion.pose is not None:
-            too_low |= rotation_matrix(motion.pose[..., 3:])[..., 2, 2] < _TUMBLED
-        self.upright[rows] &= ~(too_low & (count <= ends[:, None])).any(axis=1)
+        fallen = self.falls.fallen(rows, motion) & (count <= ends[:, None])
+        self.upright[rows] &= ~fallen.any(axis=1)
         return ends
 
     def _restart_broken(self, rows: IntArray) -> None:
         """Reset robots with states that are not finite to rest; they have fallen."""
-        broken = rows[~finite(self.world.state[rows])]
+        broken = rows[self.falls.broken(self.world.state[rows])]
         if broken.size:
             self.world.restart(broken)
             self.upright[broken] = False
@@ -270,15 +148,8 @@ class Player:
         phase = self.sensed.phase(rows, length, sensed=sensed)
         if not self._level_imu:
             return phase
-        # The trunk's frame is the world's. What acts in a tick shows in the next one's rate.
         rate = self.log.base_rate[rows, : int(length.max()) + 1]
-        if rate.shape[1] == int(length.max()):
-            rate = np.concatenate([rate, rate[:, -1:]], axis=1)
-        force = np.zeros((*rate[:, 1:].shape[:2], 3))
-        force[..., [0, 2]] = np.diff(rate, axis=1) / self.world.scenario.timestep
-        last = np.arange(len(rows)), length - 1
-        force[last] = force[last[0], np.maximum(length - 2, 0)]  # the log ends there
-        force -= self.world.scenario.gravity_vector
+        force = level_specific_force(self.world.scenario, rate, length)
         _, force = self.sensors.imu(rows, np.zeros_like(force), force)
         return replace(phase, specific_force=force)
 
@@ -293,3 +164,9 @@ class Player:
             return np.zeros(len(rows))
         pose = self.log.pose[rows, : int(length.max())]
         return self._balance.tilt(part, rows, pose, length)
+
+
+def _excerpt(tape: Tape, rows: IntArray, ticks: slice) -> Tape:
+    """Tapes of some of the robots at some of the ticks."""
+    at = rows, ticks
+    return Tape(tape.feedforward[at], tape.position[at], tape.velocity[at], tape.length[rows])

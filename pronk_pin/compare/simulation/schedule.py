@@ -8,7 +8,7 @@ from ..._checks import Interval, keep_reals
 from ...errors import InvalidInput
 
 _SHORTEST = 1.0
-"""Shortest learning and learning [s]: even a robot that lies on the ground finishes a stride."""
+"""Shortest baseline and learning together [s]: even a robot on the ground finishes a stride."""
 
 _LIMITS = {
     "startup": Interval(0, 600, "s"),
@@ -38,7 +38,7 @@ class Schedule:
         keep_reals(self, _LIMITS, "schedule: ")
         if self.baseline + self.learning < _SHORTEST:
             raise InvalidInput(
-                f"learning and learning of {self.baseline:g} + {self.learning:g} s are too short "
+                f"baseline and learning of {self.baseline:g} + {self.learning:g} s are too short "
                 f"for a stride; make them {_SHORTEST:g} s or more together"
             )
 

@@ -11,18 +11,16 @@ import pandas as pd
 from ..._checks import Interval, reals
 from ...control import ControllerSpec, Gains, InitialFeedforward
 from ...errors import InvalidInput
-from ...gait import Gait, load_library
-from ...robot import JOINTS, NL, Robot, load_robot
-from ..metrics import STEADY_STRIDES
+from ...gait import load_library
+from ...robot import load_robot
 from ..report import number
-from ..simulation import Schedule, Simulation
+from ..simulation import Schedule, Simulation, simulate
 from ..world import Scenario
+from .learning_runs import learning_law, mean_peaks
 
 SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Feedback gains of the sweep, over the controller's own."""
-NO_FEEDFORWARD = InitialFeedforward()
-"""Initial feedforward of a robot that has not learned."""
-_BASELINE, _LEARNING, _REPLAY = 4.0, 16.0, 16.0
+_LEARNING, _REPLAY = Schedule(0.5, 4.0, 16.0), Schedule(0.5, 16.0, 0.0)
 
 
 def sweep_gains(
@@ -47,27 +45,32 @@ def sweep_gains(
         stance errors `thigh` and `calf` [rad] over speeds and the last strides, robots `upright`
         and how many `robots` there are.
     """
-    if spec.law is None:
-        raise InvalidInput(
-            f"controller '{spec.name}' does not learn; choose one that does, as 'ilc'"
-        )
+    learning_law(spec)
     speeds, shares = reals("speeds", speeds), reals("shares", shares, Interval(0, 1))
     if not speeds or not shares:
         raise InvalidInput("no speeds or no shares; give at least one of each")
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
-    learning = simulate(machine, gaits, spec, scenario, Schedule(0.5, _BASELINE, _LEARNING))
-    controller = learning.controller
-    learned = InitialFeedforward(controller.feedforward, controller.flight)
+    rng = np.random.default_rng(0)
+    learning = Simulation(machine, gaits, spec, scenario, schedule=_LEARNING, rng=rng)
+    learning.run()
+    learned = InitialFeedforward(learning.controller.feedforward, learning.controller.flight)
     rows = []
     for share in shares:
-        for initial in (NO_FEEDFORWARD, learned):
+        for initial in (None, learned):
             gains = Gains(_scaled(spec.gains.kp, share), _scaled(spec.gains.kd, share))
             replay = replace(spec, law=None, flight_law=None, gains=gains)
-            if initial is NO_FEEDFORWARD:
+            if initial is None:
                 replay = replace(replay, timing=None)  # learning finds that out, too
-            schedule = Schedule(0.5, _REPLAY, 0.0)
-            replayed = simulate(machine, gaits, replay, scenario, schedule, initial)
+            replayed = simulate(
+                machine,
+                gaits,
+                replay,
+                scenario,
+                schedule=_REPLAY,
+                rng=np.random.default_rng(0),
+                initial=initial,
+            )
             rows.append({"share": share, "learned": initial is learned, **mean_peaks(replayed)})
     return pd.DataFrame(rows)
 
@@ -109,50 +112,6 @@ def _answer(table: pd.DataFrame) -> str:
         f"as full\ngains without it ({least['calf']:.3f} against {full['calf']:.3f} rad in the "
         f"calf; {alone} with those gains alone)."
     )
-
-
-def simulate(
-    robot: Robot,
-    gaits: Sequence[Gait],
-    spec: ControllerSpec,
-    scenario: Scenario,
-    schedule: Schedule,
-    initial: InitialFeedforward = NO_FEEDFORWARD,
-) -> Simulation:
-    """Run a simulation of a controller, with one seed."""
-    simulation = Simulation(
-        robot,
-        gaits,
-        spec,
-        scenario,
-        schedule=schedule,
-        rng=np.random.default_rng(0),
-        feedforward=initial.feedforward,
-        flight=initial.flight,
-    )
-    simulation.run()
-    return simulation
-
-
-def mean_peaks(simulation: Simulation, robot: int | None = None) -> dict[str, float | int]:
-    """Mean peaks over the last strides of the robots, or one, and how many robots stayed up.
-
-    Means are over those that stayed up; NaN without one.
-    """
-    log = simulation.strides
-    steady = [
-        log.peak_error[k, max(0, count - STEADY_STRIDES) : count].mean(axis=0)
-        for k, count in enumerate(log.count)
-        if robot in (None, k) and simulation.upright[k] and count
-    ]
-    legs = np.mean(steady, axis=0) if steady else np.full(NL, np.nan)
-    peaks = legs.reshape(-1, len(JOINTS)).mean(axis=0)
-    upright = simulation.upright
-    return {
-        **{joint: float(peak) for joint, peak in zip(JOINTS, peaks, strict=True)},
-        "upright": int(upright.sum()),
-        "robots": len(upright),
-    }
 
 
 def _scaled(gains: tuple[float, float, float], share: float) -> tuple[float, float, float]:

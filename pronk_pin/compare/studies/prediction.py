@@ -13,10 +13,11 @@ from ..._checks import Interval, reals, whole
 from ..._typing import Array
 from ...control import (
     ControllerSpec,
-    LearningLaw,
     LiftedModel,
+    ModelBasedILC,
     PlanarStrides,
     StrideRecord,
+    StrideSettings,
     lifted_model,
     load_controller,
     phase_grid,
@@ -26,9 +27,11 @@ from ...dynamics import Rotors
 from ...errors import InvalidInput
 from ...gait import load_library
 from ...robot import JOINTS, load_robot
-from ..experiment import Results
+from ..report import number
+from ..results import Results
 from ..simulation import Schedule, simulate
 from ..world import Scenario
+from .learning_runs import learning_law
 
 _BASELINE = 6.0
 _WIDTH = 96
@@ -78,7 +81,7 @@ def simulate_learning(
     Raises:
         InvalidInput: The controller does not learn in stance.
     """
-    _law(spec)
+    learning_law(spec)
     speeds, strides = reals("speeds", speeds), whole("strides", strides, STRIDES)
     if not speeds:
         raise InvalidInput("no speeds; give at least one")
@@ -111,7 +114,7 @@ def stored_learning(
     Raises:
         InvalidInput: More was learned than the prediction covers, or elsewhere.
     """
-    _law(spec)
+    learning_law(spec)
     experiment = results.experiment
     if not _covered(spec):
         suitable = [name for name in experiment.controllers if _covered(load_controller(name))]
@@ -155,11 +158,13 @@ def compare_prediction(
     Raises:
         InvalidInput: The controller does not learn, or there are no strides before its learning.
     """
+    law = learning_law(spec)
     robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
-    law = _law(replace(spec, flight_law=None).bind_laws(robot, [gait]))
-    settings = spec.stride_settings()
+    settings = StrideSettings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
     rotors = Rotors(scenario.armature, scenario.damping)
     model = lifted_model(robot, gait, settings, rotors=rotors)
+    if isinstance(law, ModelBasedILC):
+        law = law.with_models([lifted_model(robot, gait, settings)])
     of_speed = strides.sel(speed=speed, method="nearest").sel(part="stance")
     count = int(of_speed["count"])
     first = int(np.argmax(of_speed["learning"].to_numpy()[:count] == 1))
@@ -193,7 +198,7 @@ def describe_prediction(prediction: Prediction) -> str:
         f"  transient growth          {analysis.transient:8.3f}",
         "  error left in the limit   "
         + ", ".join(
-            f"{joint} {_percent(value)}"
+            f"{joint} {number(value, '.1%')}"
             for joint, value in zip(JOINTS, analysis.limit, strict=True)
         ),
         "  radius with other motors  "
@@ -232,14 +237,6 @@ def _factor(one: Array, other: Array) -> Array:
     return np.asarray(np.maximum(a / b, b / a))
 
 
-def _law(spec: ControllerSpec) -> LearningLaw:
-    if spec.law is None:
-        raise InvalidInput(
-            f"controller '{spec.name}' does not learn in stance; choose one with a law, as 'ilc'"
-        )
-    return spec.law
-
-
 def _covered(spec: ControllerSpec) -> bool:
     """Whether the law of the stance is all that a controller learns by."""
     return spec.law is not None and spec.flight_law is None and spec.timing is None
@@ -276,7 +273,3 @@ def _by_joint(error: Array) -> Array:
     """RMS over the phase and the legs: (strides, samples, 12) becomes (strides, 3)."""
     legs = error.reshape(*error.shape[:2], -1, len(JOINTS)).astype(float)
     return np.asarray(np.sqrt((legs**2).mean(axis=(1, 2))))
-
-
-def _percent(value: float) -> str:
-    return f"{value:.1%}" if np.isfinite(value) else "-"

@@ -12,9 +12,10 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from ..experiment import Results
+from ...robot import JOINTS
 from ..metrics import by_joint, mean_interval, robots, steady, table_1
 from ..report import SHOWN, number
+from ..results import Results
 
 _SETTLED = 0.05
 """Time after which the touchdown transient is over [s]."""
@@ -34,8 +35,8 @@ def _legs(values: xr.DataArray) -> xr.DataArray:
 
 
 def _front_left(values: xr.DataArray) -> xr.DataArray:
-    joints = values.sel(joint=[f"{_LEG}_{joint}" for joint in ("hip", "thigh", "calf")])
-    return joints.assign_coords(joint=["hip", "thigh", "calf"]).mean("stride")
+    joints = values.sel(joint=[f"{_LEG}_{joint}" for joint in JOINTS])
+    return joints.assign_coords(joint=list(JOINTS)).mean("stride")
 
 
 def _late(end: xr.Dataset) -> xr.DataArray:
@@ -73,7 +74,7 @@ def row_by_row(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") ->
         Rows by joint, controller and speed; columns `paper`, `peak`, `peak_low`, `peak_high`,
         `rms` [rad]; intervals are NaN with one seed, and all of ours where no robot stayed up.
     """
-    printed = table_1().set_index(["joint", "controller", "speed"])["value"].sort_index()
+    printed = _printed()
     rows = []
     for joint in SHOWN:
         for paper, ours in (("pd", "pd"), ("ilc", learner)):
@@ -98,6 +99,11 @@ def row_by_row(summary: pd.DataFrame, *, scenario: str, learner: str = "ilc") ->
     return pd.DataFrame(rows).set_index(["joint", "controller", "speed"]).sort_index()
 
 
+def _printed() -> pd.Series:
+    """The paper's Table I by joint, controller and speed [rad]."""
+    return table_1().set_index(["joint", "controller", "speed"])["value"].sort_index()
+
+
 def readings(results: Results, *, learners: tuple[str, ...]) -> pd.DataFrame:
     """Evaluate every reading of "tracking error" under PD and the learning laws.
 
@@ -108,7 +114,7 @@ def readings(results: Results, *, learners: tuple[str, ...]) -> pd.DataFrame:
         `distance`: root mean square of ln(ours / paper) over speeds, joints and both controllers.
         NaN without any robot.
     """
-    printed = table_1().set_index(["joint", "controller", "speed"])["value"].sort_index()
+    printed = _printed()
     values = {name: _read(results, name) for name in ("pd", *learners)}
     rows = []
     for learner in learners:

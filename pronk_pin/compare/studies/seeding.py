@@ -6,25 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
-from ..._checks import reals
 from ..._typing import Array
-from ...control import (
-    ControllerSpec,
-    InitialFeedforward,
-    TorqueLibrary,
-    load_controller,
-    model_feedforward,
-)
-from ...errors import InvalidInput
+from ...control import ControllerSpec, InitialFeedforward, TorqueLibrary, load_controller
 from ...gait import Gait, load_library
 from ...robot import JOINTS, Robot, load_robot
+from ..experiment import initial_feedforward, torque_library
 from ..metrics import STEADY_STRIDES, settling_stride
 from ..report import number
-from ..simulation import Schedule, Simulation
+from ..simulation import Schedule, simulate
 from ..world import Scenario
-from .gain_reduction import NO_FEEDFORWARD, simulate
-from .transfer import COMPARED, learn_library
+from .learning_runs import COMPARED, learn, speeds_with_neighbours
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")
 """The same laws, from nothing, from the model's feedforward, and from the torque library."""
@@ -53,20 +46,23 @@ def measure_seeding(
     Raises:
         InvalidInput: There are fewer than three speeds, or they do not increase.
     """
-    speeds = reals("speeds", speeds)
-    if len(speeds) < 3:
-        raise InvalidInput("seeding needs three speeds or more: one between two that are learned")
-    if np.any(np.diff(speeds) <= 0.0):
-        raise InvalidInput("the speeds must increase; give each once, the lowest first")
+    speeds = speeds_with_neighbours("seeding", speeds)
     machine, gaits_ = load_robot(robot), load_library(robot)
     gaits = [gaits_.at(speed) for speed in speeds]
     specs = [load_controller(name) for name in LEARNERS]
-    _, stored = learn_library(machine, gaits, specs[0], scenario)
+    stored, inner = torque_library(learn(machine, gaits, specs[0], scenario)), gaits[1:-1]
     tables = []
     for spec in specs:
-        initial = _seed(spec, machine, gaits[1:-1], stored)
-        simulation = simulate(machine, gaits[1:-1], spec, scenario, _SCHEDULE, initial)
-        tables.append(_strides(spec, speeds[1:-1], simulation))
+        strides = simulate(
+            machine,
+            inner,
+            spec,
+            scenario,
+            schedule=_SCHEDULE,
+            rng=np.random.default_rng(0),
+            initial=_seed(spec, machine, inner, stored),
+        )
+        tables.append(_by_stride(spec, speeds[1:-1], strides))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -139,20 +135,21 @@ def _settled(counts: Array) -> str:
 def _seed(
     spec: ControllerSpec, robot: Robot, gaits: Sequence[Gait], stored: TorqueLibrary
 ) -> InitialFeedforward:
-    if spec.source == "model":
-        return InitialFeedforward(model_feedforward(robot, gaits))
     if spec.source == "library":
         return stored.left_out(np.array([gait.speed for gait in gaits]))[0]
-    return NO_FEEDFORWARD
+    return initial_feedforward(spec, gaits, model=robot)
 
 
-def _strides(spec: ControllerSpec, speeds: Sequence[float], simulation: Simulation) -> pd.DataFrame:
-    log, rows = simulation.strides, []
-    first = np.argmax(log.scalars["learning"] == 1, axis=1)
-    length = int((log.count - first).min()) + 1  # as many of each robot
+def _by_stride(spec: ControllerSpec, speeds: Sequence[float], strides: xr.Dataset) -> pd.DataFrame:
+    """Peaks of each robot from the last stride before the learning on."""
+    learning, peak, upright = (
+        strides[name].to_numpy() for name in ("learning", "peak_error", "upright")
+    )
+    first, rows = np.argmax(learning == 1, axis=1), []
+    length = int((strides["count"].to_numpy() - first).min()) + 1  # as many of each robot
     for k, speed in enumerate(speeds):
         window = slice(first[k] - 1, first[k] - 1 + length)
-        peaks = log.peak_error[k, window]
+        peaks = peak[k, window]
         legs = peaks.reshape(length, -1, len(JOINTS)).mean(axis=1)  # (length, 3)
         rows.append(
             pd.DataFrame(
@@ -161,7 +158,7 @@ def _strides(spec: ControllerSpec, speeds: Sequence[float], simulation: Simulati
                     "speed": speed,
                     "stride": np.arange(length),
                     **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
-                    "upright": log.scalars["upright"][k, window] == 1,
+                    "upright": upright[k, window] == 1,
                 }
             )
         )

@@ -7,26 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
-from ..._checks import reals
 from ..._typing import Array
-from ...control import ControllerSpec, TorqueLibrary
-from ...errors import InvalidInput
+from ...control import ControllerSpec, InitialFeedforward
 from ...gait import Gait, load_library
-from ...robot import Robot, load_robot
+from ...robot import load_robot
 from ..experiment import torque_library
 from ..report import number
-from ..simulation import Schedule, Simulation, to_dataset
+from ..simulation import Schedule, simulate
 from ..world import Scenario
-from .gain_reduction import mean_peaks, simulate
+from .learning_runs import COMPARED, learn, learning_law, mean_peaks, speeds_with_neighbours
 
 TOLERANCE = 0.25
 """Relative excess that the error may have in another task over that where it was learned."""
-COMPARED = ("thigh", "calf")
-"""Joints whose errors are compared."""
-
-# At 0.8 m/s it takes 20 s until the touchdown stays at one tick.
-_LEARNING_RUN = Schedule(0.5, 4.0, 28.0)
 _REPLAY = Schedule(0.5, 16.0, 0.0)  # the strides that count begin after the start
 
 
@@ -41,15 +35,6 @@ def may_be_reused(replayed: Array, learned: Array, *, tolerance: float = TOLERAN
         tolerance: By how much their root mean square may be larger.
     """
     return _rms(replayed) <= (1.0 + tolerance) * _rms(learned)
-
-
-def learn_library(
-    robot: Robot, gaits: Sequence[Gait], spec: ControllerSpec, scenario: Scenario
-) -> tuple[Simulation, TorqueLibrary]:
-    """Learn until the touchdowns have settled; the library is the mean of the last strides."""
-    learning = simulate(robot, gaits, spec, scenario, _LEARNING_RUN)
-    strides = to_dataset(learning.strides, robot, gaits, attributes={"robot": robot.name})
-    return learning, torque_library(strides)
 
 
 def measure_transfers(
@@ -76,23 +61,20 @@ def measure_transfers(
         known of its neighbours, for a world from a trial; and whether that was `right`: whether
         learning gains no more than the tolerance.
     """
-    speeds = reals("speeds", speeds)
-    if spec.law is None:
-        raise InvalidInput(
-            f"controller '{spec.name}' does not learn; transfers need a controller that learns, as "
-            "'ilc'"
-        )
-    if len(speeds) < 3:
-        raise InvalidInput("transfers need three speeds or more: one between two; give them")
-    if np.any(np.diff(speeds) <= 0.0):
-        raise InvalidInput("the speeds must increase; give each once, the lowest first")
+    learning_law(spec)
+    speeds = speeds_with_neighbours("transfer", speeds)
     machine, library = load_robot(robot), load_library(robot)
     gaits = [library.at(speed) for speed in speeds]
     frozen = replace(spec, law=None, flight_law=None)
-    learning, stored = learn_library(machine, gaits, spec, home)
+    learning = learn(machine, gaits, spec, home)
+    stored = torque_library(learning)
     initial, inner = stored.initial_feedforward(np.array(speeds)), np.array(speeds)[1:-1]
     left_out, reusable = stored.left_out(inner)
     learned = _errors(learning)
+
+    def replay(gaits: Sequence[Gait], world: Scenario, initial: InitialFeedforward) -> xr.Dataset:
+        rng = np.random.default_rng(0)
+        return simulate(machine, gaits, frozen, world, schedule=_REPLAY, rng=rng, initial=initial)
 
     def row(task: str, replayed: Array, relearned_errors: Array, reuse: bool) -> dict[str, object]:
         gains_little = may_be_reused(replayed, relearned_errors)
@@ -100,21 +82,19 @@ def measure_transfers(
         peaks |= {"thigh_relearned": relearned_errors[0], "calf_relearned": relearned_errors[1]}
         return {"task": task, **peaks, "reuse": reuse, "right": reuse == gains_little}
 
-    def tried(task: str, replay: Simulation, relearned_errors: Simulation) -> dict[str, object]:
-        errors = _errors(replay)
-        return row(task, errors, _errors(relearned_errors), may_be_reused(errors, learned))
+    def tried(task: str, replayed: xr.Dataset, relearned: xr.Dataset) -> dict[str, object]:
+        errors = _errors(replayed)
+        return row(task, errors, _errors(relearned), may_be_reused(errors, learned))
 
-    at_home = simulate(machine, gaits, frozen, home, _REPLAY, initial)
-    rows = [tried("at home", at_home, learning)]
-    between = simulate(machine, gaits[1:-1], frozen, home, _REPLAY, left_out)
+    rows = [tried("at home", replay(gaits, home, initial), learning)]
+    between = replay(gaits[1:-1], home, left_out)
     for k, speed in enumerate(inner):
         # Robots do not know of each other: learning at home was learning at this speed, too.
         errors, relearned_errors = _errors(between, k), _errors(learning, k + 1)
         rows.append(row(f"left out {speed:+.2f} m/s", errors, relearned_errors, bool(reusable[k])))
     for scenario in scenarios:
-        replayed = simulate(machine, gaits, frozen, scenario, _REPLAY, initial)
-        relearned = simulate(machine, gaits, spec, scenario, _LEARNING_RUN)
-        rows.append(tried(scenario.name, replayed, relearned))
+        relearned = learn(machine, gaits, spec, scenario)
+        rows.append(tried(scenario.name, replay(gaits, scenario, initial), relearned))
     return pd.DataFrame(rows)
 
 
@@ -159,8 +139,8 @@ def _in_words(table: pd.DataFrame) -> str:
     )
 
 
-def _errors(simulation: Simulation, robot: int | None = None) -> Array:
-    peaks = mean_peaks(simulation, robot)
+def _errors(strides: xr.Dataset, robot: int | None = None) -> Array:
+    peaks = mean_peaks(strides, robot)
     return np.array([peaks[joint] for joint in COMPARED], dtype=float)
 
 

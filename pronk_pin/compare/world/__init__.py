@@ -4,7 +4,7 @@ Comes in: a `Robot` or an MJCF, and a `Scenario`.
 Goes out: a `World` that plays tapes or torques, and what sensors say of it.
 """
 
-from .imu import InertialUnit
+from .imu import InertialUnit, level_specific_force
 from .mismatch import KNOWN, MISMATCHES, Mismatch
 from .mjcf import ForeignRobot, mjcf_parity, mjcf_sha256, mjcf_spec
 from .motors import Motors
@@ -27,6 +27,7 @@ __all__ = [
     "World",
     "build_model",
     "finite",
+    "level_specific_force",
     "load_scenario",
     "mjcf_parity",
     "mjcf_sha256",

@@ -1,8 +1,6 @@
-"""The ground of a world, level or stepped, and the feet that meet it."""
+"""The ground of a world, level or stepped, the feet that meet it, and the friction between them."""
 
 from __future__ import annotations
-
-from typing import TypedDict
 
 import mujoco
 import numpy as np
@@ -22,14 +20,6 @@ _STEP_WIDTH = 5.0
 """Half the width of a step [m]."""
 
 
-class _Contact(TypedDict):
-    """Parameters of a geometry's contacts; of two geometries that are alike, the contact's."""
-
-    solref: list[float]
-    friction: list[float]
-    condim: int
-
-
 def add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
     """The floor with its steps, the robot's contacts with it, and sensors of the feet's forces.
 
@@ -38,21 +28,18 @@ def add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
         robot: The robot.
         scenario: The scenario.
     """
-    contact: _Contact = {
-        "solref": [scenario.ground_time_constant, 1],
-        "friction": [scenario.ground_friction, 0.005, 0.0001],
-        "condim": 3,
-    }
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = 0, 1  # the robot meets the ground, not itself
-        geom.solref, geom.friction, geom.condim = contact.values()
-    ground = {"contype": 1, "conaffinity": 0, **contact}
+        _set_contact(geom, scenario)
     plane, box = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
-    spec.worldbody.add_geom(name=_FLOOR, type=plane, size=[0, 0, 1], **ground)
+    ground = [spec.worldbody.add_geom(name=_FLOOR, type=plane, size=[0, 0, 1])]
     half = 0.5 * scenario.step_length
     for centre, height in zip(*steps(scenario), strict=True):
         size = [half, _STEP_WIDTH, height]  # half of it below the floor
-        spec.worldbody.add_geom(type=box, size=size, pos=[centre, 0, 0], **ground)
+        ground.append(spec.worldbody.add_geom(type=box, size=size, pos=[centre, 0, 0]))
+    for geom in ground:
+        geom.contype, geom.conaffinity = 1, 0
+        _set_contact(geom, scenario)
     force = mujoco.mjtConDataField.mjCONDATA_FORCE
     for foot in robot.foot_names:
         spec.add_sensor(
@@ -65,6 +52,17 @@ def add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
             # data fields, reduction (3: net force in the world frame), number of contacts
             intprm=[1 << int(force), 3, 1],
         )
+
+
+def _set_contact(geom: mujoco.MjsGeom, scenario: Scenario) -> None:
+    """Softness and friction, the same of feet and ground, so that they are those of the contact.
+
+    With `condim` 3 it is the friction against sliding; those against spinning and rolling are
+    MuJoCo's, and do not act.
+    """
+    geom.solref = [scenario.ground_time_constant, 1]
+    geom.friction = [scenario.ground_friction, 0.005, 0.0001]
+    geom.condim = 3
 
 
 def steps(scenario: Scenario) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""IMUs on trunks that may turn, and the attitude estimated from them."""
+"""IMUs: on trunks that may turn, read tick by tick; on level ones, a phase at a time."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from ..._typing import Array, IntArray
 from ...robot import rotation_matrix
+from .scenario import Scenario
 from .sensors import SensorSuite
 from .world import World
 
@@ -49,3 +50,28 @@ class InertialUnit:
         force = np.einsum("nji,nj->ni", rotation, acceleration - self._gravity)
         gyro, force = self._sensors.imu(rows, twist[:, None, 3:], force[:, None])
         return gyro[:, 0], force[:, 0]
+
+
+def level_specific_force(scenario: Scenario, base_rate: Array, length: IntArray) -> Array:
+    """Compute the specific force on trunks that stay level, at each tick of a phase [m/s^2].
+
+    Their frame is the world's. What acts in a tick shows in the next one's rate; the last tick, at
+    which the log ends, has the force of the one before.
+
+    Args:
+        scenario: The scenario, whose gravity acts.
+        base_rate: Rates of the trunks' x and z [m/s], shape (m, ticks + 1, 2), or without the
+            tick after the longest phase, (m, ticks, 2).
+        length: Ticks of each robot's phase, shape (m,).
+
+    Returns:
+        Shape (m, ticks, 3).
+    """
+    if base_rate.shape[1] == int(length.max()):
+        base_rate = np.concatenate([base_rate, base_rate[:, -1:]], axis=1)
+    force = np.zeros((*base_rate[:, 1:].shape[:2], 3))
+    force[..., [0, 2]] = np.diff(base_rate, axis=1) / scenario.timestep
+    last = np.arange(len(length)), length - 1
+    force[last] = force[last[0], np.maximum(length - 2, 0)]
+    force -= scenario.gravity_vector
+    return force

@@ -77,7 +77,7 @@ KNOWN = {
     "damping": Mismatch("viscous friction", 0.5, "N m s/rad", _of("damping")),
     "coulomb": Mismatch("Coulomb friction", 0.6, "N m", _of("coulomb")),
     "soft-ground": Mismatch("time constant of contact", 0.01, "s", _of("ground_time_constant")),
-    "slippery": Mismatch("friction coefficient of the ground", 0.2, "1", _of("ground_friction")),
+    "slippery": Mismatch("friction of feet on ground", 0.2, "1", _of("ground_friction")),
     "slope": Mismatch("slope, uphill where positive", 0.1, "rad", _of("slope")),
     "steps": Mismatch("greatest height of steps", 0.01, "m", _of("step_height")),
     "gravity": Mismatch("gravitational acceleration", 8.8, "m/s^2", _of("gravity")),

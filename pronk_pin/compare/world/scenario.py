@@ -66,7 +66,10 @@ _VECTORS = {
 class Scenario:
     """The true parameters of a simulated scenario.
 
-    The robot is what its URDF or MJCF says; what the scenario adds comes on top of that.
+    The robot is what its URDF or MJCF says; what the scenario adds comes on top of that. Values and
+    defaults stand here. How they act: `motors.py` (delay, speed, pushes), `payload.py` (payload and
+    centre of mass), `ground.py` (contact, the feet's friction, steps), `sensors.py`, and
+    `build_model` in `world.py` for what MuJoCo has a parameter for (joints, slope, gravity).
 
     A slope is played as gravity that leans back, so that the ground's frame stays the world's: x
     goes up the slope, z stands on it, and a locked trunk stays parallel to it.
@@ -82,11 +85,12 @@ class Scenario:
             where speed does not matter.
         delay: Time from a command to its torque [s], a whole number of time steps.
         payload: Mass fixed to the trunk [kg].
-        payload_position: Where the payload sits, in the trunk's frame [m].
+        payload_position: The payload's place, in the trunk's frame [m].
         com_shift: Shift of the trunk's centre of mass, its mass and inertia kept [m].
         sensors: How far the sensors are from the truth.
         ground_time_constant: Time constant of the contact [s], MuJoCo's solref; larger is softer.
-        ground_friction: Friction coefficient between foot and ground.
+        ground_friction: Friction coefficient of the feet on the ground, the mu of their cones; the
+            feet's and the ground's are the same. Stored results have this name.
         slope: Slope of the ground, uphill in x where positive [rad].
         step_height: Greatest height of the steps across the way [m].
         step_length: Length of a step along the way [m].

@@ -1,8 +1,8 @@
 """The simulated scenario: robots in MuJoCo, from the same URDF, with the scenario's mismatches.
 
-The base is locked to the sagittal plane without rotation, as in the paper (section III): the trunk
-has two slides, x and z. `qpos` and `qvel` stay inside this module; what it takes and gives is in
-Pinocchio's order.
+With base `locked` the trunk has two slides, x and z, as in the paper (section III); with `sagittal`
+a hinge for its pitch besides; with `free` the free joint of the model. `qpos` and `qvel` stay
+inside this module; what it takes and gives is in Pinocchio's order.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from ...robot.formats import mujoco_spec
 from .ground import add_ground, name_feet
 from .mjcf import mjcf_spec
 from .motors import push_force
+from .payload import apply_payload
 from .scenario import Scenario
-from .trunk_mass import load_trunk
 from .trunk_state import Trunk
 
 _FULL = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -66,7 +66,7 @@ def build_model(
             trunk.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
         if base == "sagittal":
             trunk.add_joint(name="pitch", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
-    load_trunk(trunk, scenario)
+    apply_payload(trunk, scenario)
     _add_motors(spec, robot, scenario, servo)
     name_feet(spec, robot)
     add_ground(spec, robot, scenario)

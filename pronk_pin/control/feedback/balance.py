@@ -28,7 +28,7 @@ from ...gait import Gait, known_gaits
 from ...inverse_dynamics import distribute_wrench
 from ...kinematics import contact_points, leg_geometry
 from ...robot import JOINTS, Robot, rotation_matrix
-from ..signals import PARTS, Gains
+from ..signals import PARTS, ControlContext, Gains
 from .attitude import AttitudeRegulator, attitude_angle, attitude_error, pitched
 from .foot_placement import FootPlacement, placed
 
@@ -58,20 +58,18 @@ class BalanceSpec:
         keep_instances(self, "balance: ", attitude=AttitudeRegulator, placement=FootPlacement)
         keep_reals(self, {"learned": SHARE, "landing": SHARE}, "balance: ")
 
-    def bind(
-        self,
-        robot: Robot,
-        gaits: Sequence[Gait],
-        *,
-        base: str,
-        gains: Gains,
-        ticks: int,
-        timestep: float,
-    ) -> Balance | None:
-        """Make the balance of n robots: see `Balance`; None where the base is locked."""
-        if base == "locked":
+    def bind(self, context: ControlContext) -> Balance | None:
+        """The balance of a controller's robots; None where their trunks are locked."""
+        if context.base == "locked":
             return None
-        return Balance(robot, gaits, self, gains=gains, ticks=ticks, timestep=timestep)
+        return Balance(
+            context.robot,
+            context.gaits,
+            self,
+            gains=context.gains,
+            ticks=context.ticks,
+            timestep=context.timestep,
+        )
 
 
 _TICKS = Interval(1, 10_000_000)
@@ -109,12 +107,12 @@ class Balance:
         ticks, timestep = whole("ticks", ticks, _TICKS), real("timestep", timestep, POSITIVE)
         self._spec, self._gains, self._radius = spec, gains, robot.foot_radius
         self._geometry = leg_geometry(robot)
-        duration = np.array([[gait.phase(part).duration for part in PARTS] for gait in gaits])
+        duration = np.array([[getattr(g, part).duration for part in PARTS] for g in gaits])
         self._s = np.minimum(np.arange(ticks) * timestep / duration[..., None], 1.0)
         pitch, rate = np.zeros((2, len(gaits), len(PARTS), ticks))
         for k, gait in enumerate(gaits):
             for p, part in enumerate(PARTS):
-                base, speed = gait.phase(part).base_reference(self._s[k, p])
+                base, speed = getattr(gait, part).base_reference(self._s[k, p])
                 pitch[k, p] = base[:, 2]
                 rate[k, p] = np.where(self._s[k, p] < 1.0, speed[:, 2], 0.0)
         self._reference, self._rate = pitched(pitch), rate

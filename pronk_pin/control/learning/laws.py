@@ -5,23 +5,34 @@ A law is a function with parameters and no state: what was learned so far is in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self
 
 import numpy as np
 
 from ..._checks import SHARE, Interval, instance_of, keep_reals, shown
-from ..._typing import Array, IntArray
+from ..._typing import Array, BoolArray, IntArray
 from ...errors import InvalidInput
 from ...gait import Gait
-from ...robot import Robot
-from ..signals import PAPER_A, PAPER_B, Gains, StrideRecord, ZeroPhaseFilter, look_ahead
+from ..signals import (
+    PAPER_A,
+    PAPER_B,
+    ControlContext,
+    Gains,
+    StrideRecord,
+    ZeroPhaseFilter,
+    look_ahead,
+)
 from .lifted import LiftedModel
 
 
 class LearningLaw(Protocol):
-    """A learning law `u_{k+1} = L(record_k)`: from a stride's record to the next feedforward."""
+    """A learning law `u_{k+1} = L(record_k)`: from a stride's record to the next feedforward.
+
+    One that needs to know its robots has a method `bind(context)` too, from a `LawContext` to the
+    law that is to be used for them.
+    """
 
     def update(self, record: StrideRecord) -> Array:
         """Compute the next stride's feedforward on the phase grid [N m], shape (n, samples, 12)."""
@@ -29,41 +40,20 @@ class LearningLaw(Protocol):
 
 
 @dataclass(frozen=True)
-class LawContext:
-    """Context in which a controller's law is going to learn, known before the first stride.
+class LawContext(ControlContext):
+    """What a learning law may be bound to.
 
     Attributes:
-        controller: Name of the controller.
-        part: Part of the stride that the law learns, one of `PARTS`.
-        robot: The robot.
-        gaits: The gait of each of the n robots, in the order of `StrideRecord.robot`.
-        base: How the trunks may move, one of `BASES`.
-        gains: Feedback gains.
-        timestep: Time step of the control [s].
-        lifted_models: Computes the model of each robot's stance under this controller: seconds.
+        lifted_model: Linearises the strides of a gait under the controller; takes a second.
     """
 
-    controller: str
-    part: str
-    robot: Robot
-    gaits: Sequence[Gait]
-    base: str
-    gains: Gains
-    timestep: float
-    lifted_models: Callable[[], Sequence[LiftedModel]]
+    lifted_model: Callable[[Gait], LiftedModel]
 
 
-@runtime_checkable
-class BindableLaw(LearningLaw, Protocol):
-    """A learning law that wants to know where it is going to learn, or refuses to."""
-
-    def bind(self, context: LawContext) -> LearningLaw:
-        """The law as a controller uses it; called once, before the first stride.
-
-        Raises:
-            InvalidInput: It cannot learn there.
-        """
-        ...
+def bound(law: LearningLaw | None, context: LawContext) -> LearningLaw | None:
+    """A law bound to the robots that it learns for, if it has a method `bind`."""
+    bind = getattr(law, "bind", None)
+    return law if bind is None else known_law(f"{context.controller}: bound law", bind(context))
 
 
 SKIPPED = (
@@ -110,6 +100,10 @@ class StrideSelection:
         ]
         return np.asarray(np.select(checks, range(1, len(checks) + 1), default=0), dtype=np.intp)
 
+    def usable(self, record: StrideRecord) -> BoolArray:
+        """Whether strides may be learned from, shape (n,)."""
+        return np.asarray(self.skipped(record) == 0)
+
 
 def delivered(record: StrideRecord) -> StrideRecord:
     """The record with the torques that the motors delivered; saturation cuts the feedback first.
@@ -149,23 +143,15 @@ _GAIN = Interval(0, 2, below=True)
 _DELTA = Interval(0, 1, below=True)
 
 
-class _FilteredILC(LearningLaw, Protocol):
-    """What laws have in common that pass what they learned through a filter Q."""
-
-    filter: ZeroPhaseFilter
-
-    def bind(self, context: LawContext) -> LearningLaw:
-        """The law itself, with a warning if its filter loses torque: see `ZeroPhaseFilter.warn`."""
-        if isinstance(self.filter, ZeroPhaseFilter):  # any function will do
-            self.filter.warn()
-        return self
-
-    def _check_filter(self, law: str) -> None:
-        if not callable(self.filter):
-            raise InvalidInput(
-                f"{law}: filter={shown(self.filter)} is no filter; give a ZeroPhaseFilter, or a "
-                "function of an array (n, samples, 12)"
-            )
+def _check_parts(law: str, owner: PDTypeILC | PaperILC | CurrentIterationILC) -> None:
+    """The gains and the filter of a law."""
+    if not isinstance(owner, CurrentIterationILC):
+        instance_of(f"{law}: gains", owner.gains, Gains)
+    if not callable(owner.filter):
+        raise InvalidInput(
+            f"{law}: filter={shown(owner.filter)} is no filter; give a ZeroPhaseFilter, or a "
+            "function of an array (n, samples, 12)"
+        )
 
 
 def known_law(name: str, law: object) -> LearningLaw | None:
@@ -174,35 +160,14 @@ def known_law(name: str, law: object) -> LearningLaw | None:
     Raises:
         InvalidInput: It is neither.
     """
-    if law is not None and not _is_law(law):
+    # Dictionaries and sets have an `update` too.
+    other = isinstance(law, type | Mapping | set) or not callable(getattr(law, "update", None))
+    if law is not None and other:
         raise InvalidInput(
             f"{name}={shown(law)} is no learning law; give an object with update(record), such as "
             "PDTypeILC(), or None"
         )
     return law  # type: ignore[return-value]
-
-
-def _is_law(law: object) -> bool:
-    # Dictionaries and sets have an `update` too.
-    return not isinstance(law, type | Mapping | set) and callable(getattr(law, "update", None))
-
-
-def bind_law(law: LearningLaw | None, context: LawContext) -> LearningLaw | None:
-    """Bind a law to its context; one without `bind`, or None, stays as it is.
-
-    Raises:
-        InvalidInput: It cannot learn there, or its `bind` answers no law.
-    """
-    if not isinstance(law, BindableLaw):
-        return law
-    ready = law.bind(context)
-    if not _is_law(ready):
-        raise InvalidInput(
-            f"the law {type(law).__name__} of controller '{context.controller}' answered "
-            f"{shown(ready)} to bind(context); let it return an object with update(record), such "
-            "as itself"
-        )
-    return ready
 
 
 def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array:
@@ -228,8 +193,24 @@ def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array
     return answer
 
 
+class FilteredLaw:
+    """A law with a learning filter, which is looked at when the law is bound.
+
+    Attributes:
+        filter: The learning filter Q.
+    """
+
+    filter: ZeroPhaseFilter
+
+    def bind(self, context: LawContext) -> Self:
+        """The law itself; warns with `LeakyFilter` if constant torques do not pass its filter."""
+        if isinstance(self.filter, ZeroPhaseFilter):  # it may be any function
+            self.filter.warn()
+        return self
+
+
 @dataclass(frozen=True)
-class PDTypeILC(_FilteredILC):
+class PDTypeILC(FilteredLaw):
     """PD-type ILC on a memory that holds the feedforward only, with forgetting.
 
     `ff <- Q[(1 - leak) ff + gain (Kp e + Kd e')(s + delta)]`
@@ -240,8 +221,7 @@ class PDTypeILC(_FilteredILC):
     Attributes:
         gain: Learning gain; 0 to 1.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead, as a part of the phase s from 0 to 1: how much later the error is read,
-            since what a feedforward does takes a while to show in it.
+        delta: Look-ahead in phase; what the feedforward does takes a while to show in the error.
         gains: Weights of the error and its rate: eq. (10).
         filter: The learning filter Q.
     """
@@ -254,8 +234,7 @@ class PDTypeILC(_FilteredILC):
 
     def __post_init__(self) -> None:
         keep_reals(self, {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}, "a PD-type law: ")
-        instance_of("a PD-type law: gains", self.gains, Gains)
-        self._check_filter("a PD-type law")
+        _check_parts("a PD-type law", self)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -263,19 +242,8 @@ class PDTypeILC(_FilteredILC):
         return self.filter((1.0 - self.leak) * record.feedforward + self.gain * correction)
 
 
-FLIGHT_LAW = PDTypeILC(
-    gain=0.8,
-    leak=0.02,
-    delta=0.08,
-    # The error's rate would learn the vibration of the leg after lift-off.
-    gains=Gains(kd=(0.0, 0.0, 0.0)),
-    filter=ZeroPhaseFilter.butterworth(3, 0.04),
-)
-"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""
-
-
 @dataclass(frozen=True)
-class PaperILC(_FilteredILC):
+class PaperILC(FilteredLaw):
     """The paper's law: eq. (10), on the recorded total torque, with the printed filter.
 
     `ff <- Q[tau + (Kp e + Kd e')(s + delta)]` with `tau = ff + tau_b`, the recorded torque.
@@ -284,7 +252,7 @@ class PaperILC(_FilteredILC):
     is 2; only the filter's leak keeps the law from diverging.
 
     Attributes:
-        delta: Look-ahead, as a part of the phase s from 0 to 1, into the error.
+        delta: Look-ahead in phase.
         gains: Feedforward gains, in the paper equal to the feedback gains.
         filter: Zero-phase filter over recorded torques and errors.
     """
@@ -295,8 +263,7 @@ class PaperILC(_FilteredILC):
 
     def __post_init__(self) -> None:
         keep_reals(self, {"delta": _DELTA}, "the paper's law: ")
-        instance_of("the paper's law: gains", self.gains, Gains)
-        self._check_filter("the paper's law")
+        _check_parts("the paper's law", self)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -305,7 +272,7 @@ class PaperILC(_FilteredILC):
 
 
 @dataclass(frozen=True)
-class CurrentIterationILC(_FilteredILC):
+class CurrentIterationILC(FilteredLaw):
     """Current-iteration law: the feedback that acted in the stride becomes memory.
 
     `ff <- Q[(1 - leak) ff + gain tau_b(s + delta)]`
@@ -317,7 +284,7 @@ class CurrentIterationILC(_FilteredILC):
     Attributes:
         gain: Part of the feedback torque that is taken over; 1 in the textbook.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead, as a part of the phase s from 0 to 1, into the feedback.
+        delta: Look-ahead in phase.
         filter: The learning filter Q.
     """
 
@@ -329,7 +296,7 @@ class CurrentIterationILC(_FilteredILC):
     def __post_init__(self) -> None:
         checks = {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}
         keep_reals(self, checks, "a current-iteration law: ")
-        self._check_filter("a current-iteration law")
+        _check_parts("a current-iteration law", self)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
@@ -342,3 +309,14 @@ def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:
     error = look_ahead(record.error, delta, record.error_onward)
     rate = look_ahead(record.error_rate, delta, record.rate_onward)
     return gains.proportional * error + gains.derivative * rate
+
+
+FLIGHT_LAW = PDTypeILC(
+    gain=0.8,
+    leak=0.02,
+    delta=0.08,
+    # The error's rate would learn the vibration of the leg after lift-off.
+    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    filter=ZeroPhaseFilter.butterworth(3, 0.04),
+)
+"""Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""

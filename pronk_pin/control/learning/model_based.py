@@ -65,12 +65,13 @@ def spline_basis(samples: int, splines: int) -> Array:
 
 @dataclass(frozen=True)
 class ModelBasedILC:
-    """A learning law of the stance that needs the lifted model of each robot's gait.
+    """A learning law that needs the lifted model of each robot's gait, which `bind` asks for.
 
     Attributes:
         splines: B-splines a joint that make up the feedforward; None for one a sample.
         horizon: Number of strides ahead whose responses to a change are weighed.
-        responses: The models' responses, one for each robot; empty until `bind` or `with_models`.
+        responses: The models' responses, one for each robot; empty until `bind`
+            or `with_models`.
     """
 
     splines: int | None = field(default=SPLINES, kw_only=True)
@@ -85,25 +86,20 @@ class ModelBasedILC:
         none_or(whole, f"{prefix}splines", self.splines, Interval(_DEGREE + 1, 1000))
 
     def bind(self, context: LawContext) -> ModelBasedILC:
-        """The law with the models of a controller's stances.
+        """Bind the law to the models of a controller's robots.
 
         Raises:
-            InvalidInput: The models do not hold there: the base is not locked, or it is the flight.
+            InvalidInput: The trunks may turn, which the models do not know.
         """
         if context.base != "locked":
             raise InvalidInput(
                 f"controller '{context.controller}' has a law with a model that counts on a level "
                 "trunk; use another controller, or base 'locked'"
             )
-        if context.part != "stance":
-            raise InvalidInput(
-                f"controller '{context.controller}' has a law with a model of the stance as that "
-                f"of the {context.part}; use another one, such as PDTypeILC(), or None"
-            )
-        return self.with_models(context.lifted_models())
+        return self.with_models([context.lifted_model(gait) for gait in context.gaits])
 
     def with_models(self, models: Sequence[LiftedModel]) -> ModelBasedILC:
-        """The law with models of the robots, in the order of `StrideRecord.robot`."""
+        """The law with the models of its robots, in the order of `StrideRecord.robot`."""
         responses = tuple(
             ErrorResponse.of(model, splines=self.splines, horizon=self.horizon) for model in models
         )

@@ -5,6 +5,7 @@ Goes out: `Tape`, `StrideRecord`, filtered signals, and detected contacts.
 """
 
 from .contact_detection import ContactDetector, StanceContact, TouchdownDetector
+from .context import ControlContext
 from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, first_order, look_ahead
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
 from .reference import FlightTiming, Reference
@@ -16,6 +17,7 @@ __all__ = [
     "PARTS",
     "SAMPLES",
     "ContactDetector",
+    "ControlContext",
     "FlightTiming",
     "Gains",
     "PhaseLog",

@@ -58,7 +58,7 @@ class ZeroPhaseFilter:
                 f"{change} {abs(1.0 - self.dc_gain):.0%} of a constant torque in each stride; use "
                 "coefficients that are not rounded, as ZeroPhaseFilter.butterworth gives them",
                 LeakyFilter,
-                stacklevel=6,  # who makes a controller: beyond `bind`, `bind_law`, `bind_laws`
+                stacklevel=3,
             )
 
     @classmethod

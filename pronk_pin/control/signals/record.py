@@ -107,20 +107,17 @@ class StrideRecord:
     @classmethod
     def unknown(cls, n: int) -> StrideRecord:
         """Make the record of n robots that have made no stride yet: NaN."""
-
-        def unknown(*shape: int) -> Array:
-            return np.full((n, *shape), np.nan)
-
+        curve, onward = (n, SAMPLES, NL), (n, ONWARD, NL)
         return cls(
-            error=unknown(SAMPLES, NL),
-            error_rate=unknown(SAMPLES, NL),
-            feedback=unknown(SAMPLES, NL),
-            feedforward=unknown(SAMPLES, NL),
-            missing=unknown(SAMPLES, NL),
-            relative_duration=unknown(),
-            contact_error=unknown(NL),
-            error_onward=unknown(ONWARD, NL),
-            rate_onward=unknown(ONWARD, NL),
+            error=np.full(curve, np.nan),
+            error_rate=np.full(curve, np.nan),
+            feedback=np.full(curve, np.nan),
+            feedforward=np.full(curve, np.nan),
+            missing=np.full(curve, np.nan),
+            relative_duration=np.full(n, np.nan),
+            contact_error=np.full((n, NL), np.nan),
+            error_onward=np.full(onward, np.nan),
+            rate_onward=np.full(onward, np.nan),
             upright=np.ones(n, dtype=bool),
             robot=np.arange(n),
         )

@@ -17,7 +17,7 @@ from ..._typing import Array
 from ...dynamics import planar_rows
 from ...errors import GaitNotFound
 from ...kinematics import contact_jacobian, foot_positions
-from ...robot import NB, Robot
+from ...robot import NB
 from .. import bezier
 from ..checks import Audit, Check
 from ..gait import Motion
@@ -78,7 +78,7 @@ def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
     """
     robot, losses_by_phase = solution.problem.robot, {}
     for phase, motion in _phases(solution):
-        losses, feet = [], _feet(robot, motion)
+        losses, feet = [], foot_positions(robot, motion.q)
         s = motion.t / motion.t[-1]
         for order in ORDERS:
             fitted = fit_phase(solution, dataclasses.replace(phase, order=order))
@@ -137,7 +137,7 @@ def _symmetry(solution: GaitSolution) -> Check:
     right = [i for i, leg in enumerate(robot.legs) if leg.endswith("R")]
     by_phase = {}
     for name, motion in solution.motions.items():
-        feet = _feet(robot, motion)  # (nodes, 4, 3)
+        feet = foot_positions(robot, motion.q)  # (nodes, 4, 3)
         mirror = feet[:, left] - feet[:, right] * np.array([1.0, -1.0, 1.0])
         by_phase[name] = (motion, mirror)
     return _worst("mirror symmetry", by_phase)
@@ -159,7 +159,7 @@ def _contact_drift(solution: GaitSolution) -> tuple[Check, Check]:
     robot, contact = solution.problem.robot, solution.problem.contact
     height, slip = {}, {}
     for name, motion, legs in _stances(solution):
-        height[name] = (motion, _feet(robot, motion)[:, legs, 2] - robot.foot_radius)
+        height[name] = (motion, foot_positions(robot, motion.q)[:, legs, 2] - robot.foot_radius)
         feet = [robot.legs[leg] for leg in legs]
         velocity = [
             contact_jacobian(robot, q, feet=feet, contact=contact) @ v
@@ -261,8 +261,3 @@ def _use(solution: GaitSolution) -> tuple[Check, ...]:
         _worst("friction use", cone),
         _worst("ground force", total),
     )
-
-
-def _feet(robot: Robot, motion: Motion) -> Array:
-    """Centres of the feet at the nodes [m], shape (nodes, 4, 3)."""
-    return foot_positions(robot, motion.q)

@@ -9,6 +9,7 @@ solver does not manage that, its squares. What has to give is what fights.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -16,7 +17,7 @@ import numpy as np
 
 from ..._typing import Array
 from ..._workers import heeding_signals
-from .transcription import Constraint, Transcription
+from .transcription import QUIET, Constraint, Transcription, Unknown
 
 DEMANDS: Mapping[str, tuple[float, str]] = {
     "average speed": (0.1, "ask for a speed nearer to zero"),
@@ -46,11 +47,6 @@ _REGULAR = 0.1
 """Weight of the gait's own cost, beside what gives way: the problem needs some curvature."""
 
 _OPTIONS: dict[str, Any] = {
-    "print_time": False,
-    "error_on_fail": False,
-    "show_eval_warnings": False,
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
     "ipopt.max_iter": 150,
     "ipopt.tol": 1e-5,
     "ipopt.constr_viol_tol": 1e-6,
@@ -83,38 +79,26 @@ def find_conflicts(program: Transcription, start: Array, p: Array) -> dict[str, 
     constraints: list[Constraint] = []
     for c in program.constraints:
         constraints += _elastic(c, room[c.name]) if c.name in room else [c]
-    lower, upper = [], []
-    for unknown in program.unknowns.values():
+    unknowns = {}
+    for key, unknown in program.unknowns.items():
         low, high = unknown.lower.copy(), unknown.upper.copy()
         for row, name in enumerate(unknown.limits):
-            if name not in room:
-                continue
-            values = unknown.symbol[row, :]
-            bounded = Constraint(name, "", values, float(low[row]), float(high[row]))
-            constraints += _elastic(bounded, room[name])
-            low[row], high[row] = -np.inf, np.inf
-        lower.append(np.tile(low, unknown.symbol.shape[1]))
-        upper.append(np.tile(high, unknown.symbol.shape[1]))
-    nlp = program.nlp
-    sizes = [c.expression.numel() for c in constraints]
+            if name in room:
+                values = unknown.symbol[row, :]
+                bounded = Constraint(name, "", values, float(low[row]), float(high[row]))
+                constraints += _elastic(bounded, room[name])
+                low[row], high[row] = -np.inf, np.inf
+        unknowns[key] = replace(unknown, lower=low, upper=high)
+    ones = np.ones(len(names))
+    unknowns["slack"] = Unknown("", slack, 0.0 * ones, np.inf * ones, ("",) * len(names))
+    elastic = Transcription.of(unknowns, program.parameters, program.cost, tuple(constraints))
     for squares, strategy in _ATTEMPTS:
         measure = 10.0 * ca.sumsqr(slack) if squares else 100.0 * ca.sum1(slack)
-        problem = {
-            "x": ca.vertcat(nlp["x"], slack),
-            "p": nlp["p"],
-            "f": measure + (_REGULAR / 10 if squares else _REGULAR) * nlp["f"],
-            "g": ca.vertcat(*[ca.vec(c.expression) for c in constraints]),
-        }
-        solver = ca.nlpsol("elastic", "ipopt", problem, _OPTIONS | strategy)
+        cost = measure + (_REGULAR / 10 if squares else _REGULAR) * program.cost
+        options = QUIET | _OPTIONS | strategy
+        solver = ca.nlpsol("elastic", "ipopt", replace(elastic, cost=cost).nlp, options)
         with heeding_signals():
-            result = solver(
-                x0=np.concatenate([start, np.ones(len(names))]),
-                lbx=np.concatenate([*lower, np.zeros(len(names))]),
-                ubx=np.concatenate([*upper, np.full(len(names), np.inf)]),
-                lbg=np.repeat([c.lower for c in constraints], sizes),
-                ubg=np.repeat([c.upper for c in constraints], sizes),
-                p=p,
-            )
+            result = solver(x0=np.concatenate([start, ones]), **elastic.bounds, p=p)
         if solver.stats()["success"]:
             slacks = np.array(result["x"]).ravel()[-len(names) :]
             conflicting = [i for i in np.argsort(-slacks) if slacks[i] > NOTABLE]

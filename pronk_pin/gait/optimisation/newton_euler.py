@@ -47,22 +47,18 @@ class _Inertia(NamedTuple):
     second: Array
     """Rotational inertia about the origin [kg m^2], shape (3, 3)."""
 
-    def mean(self, other: _Inertia) -> _Inertia:
-        """Mean with another inertia."""
+    def paired(self, other: _Inertia, sign: float) -> _Inertia:
+        """Mean with another inertia; with a sign of -1, half the difference."""
         return _Inertia(
-            0.5 * (self.mass + other.mass),
-            0.5 * (self.first + other.first),
-            0.5 * (self.second + other.second),
+            0.5 * (self.mass + sign * other.mass),
+            0.5 * (self.first + sign * other.first),
+            0.5 * (self.second + sign * other.second),
         )
 
     def mirrored(self) -> _Inertia:
         """Mirror image about the plane y = 0."""
         flip = np.array([1.0, -1.0, 1.0])
         return _Inertia(self.mass, flip * self.first, np.outer(flip, flip) * self.second)
-
-    def minus(self) -> _Inertia:
-        """The negative of the inertia."""
-        return _Inertia(-self.mass, -self.first, -self.second)
 
 
 @dataclass(frozen=True)
@@ -216,19 +212,18 @@ def _rotation(axis: Array, angle: ca.SX) -> ca.SX:
 
 def _links(robot: Robot, leg: str, half: Half) -> list[_Link]:
     """The links of a leg from the trunk down, with their share of the pair's inertias."""
-    links = []
+    links, sign = [], 1.0 if half == "mean" else -1.0
     names = zip(robot.spec.leg_joints(leg), robot.spec.leg_joints(mirrored(leg)), strict=True)
     for own, other in names:
         i, j = robot.model.getJointId(own), robot.model.getJointId(other)
         placement, image = robot.model.jointPlacements[i], _inertia(robot, j).mirrored()
         armature = [float(robot.model.armature[robot.model.joints[k].idx_v]) for k in (i, j)]
-        sign = 1.0 if half == "mean" else -1.0
         links.append(
             _Link(
                 rotation=np.array(placement.rotation),
                 translation=np.array(placement.translation),
                 axis=np.array(robot.model.joints[i].createData().S).ravel()[3:],
-                body=_inertia(robot, i).mean(image if half == "mean" else image.minus()),
+                body=_inertia(robot, i).paired(image, sign),
                 armature=0.5 * (armature[0] + sign * armature[1]),
             )
         )

@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -24,15 +24,10 @@ from .collocation import node_phases, transcribe
 from .elastic import find_conflicts, remedies
 from .folded_model import FoldedModel
 from .guess import vertical_hop
-from .transcription import Transcription, Violation
+from .transcription import QUIET, Transcription, Violation
 from .unfold import fitted, fold_problem, touchdown_impulse, unfolded
 
-_COLD: dict[str, Any] = {
-    "print_time": False,
-    "error_on_fail": False,
-    "show_eval_warnings": False,
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
+_COLD = QUIET | {
     "ipopt.max_iter": 300,
     "ipopt.tol": 1e-8,
     "ipopt.constr_viol_tol": 1e-9,

@@ -16,6 +16,15 @@ import numpy as np
 from ..._typing import Array
 from ...errors import InvalidInput
 
+QUIET: dict[str, Any] = {
+    "print_time": False,
+    "error_on_fail": False,
+    "show_eval_warnings": False,
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+}
+"""Options of `casadi.nlpsol` with which IPOPT prints nothing, and a failure is no error."""
+
 
 @dataclass(frozen=True, eq=False)
 class Unknown:

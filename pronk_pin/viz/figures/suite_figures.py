@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from ..._typing import Array
 from ...compare.metrics import RIVAL, PeakHistory
-from ...compare.report import SHOWN
+from ...compare.report import SHOWN, ControllerOverview, Overview
 from ..figure_style import (
     SEQUENTIAL,
     TWO_COLUMNS,
@@ -31,30 +32,31 @@ _COLUMNS = 3
 
 
 @styled
-def heat_map(table: pd.DataFrame) -> Figure:
+def heat_map(tables: Mapping[str, Overview]) -> Figure:
     """Mean peak error of every controller in every scenario, one panel a joint.
 
     Args:
-        table: `compare.tables.answer`. Where robots fell, their number stands below the error, or
+        tables: `compare.report.answer`. Where robots fell, their number stands below the error, or
             instead of it.
     """
-    scenarios = list(dict.fromkeys(table.index.get_level_values("scenario")))
-    controllers = in_order(table.index.get_level_values("controller"))
-    figure = new_figure(TWO_COLUMNS, 1.1 + 0.27 * len(scenarios))
+    controllers = in_order(name for table in tables.values() for name in table)
+    figure = new_figure(TWO_COLUMNS, 1.1 + 0.27 * len(tables))
     panels = figure.subplots(1, len(SHOWN), sharey=True)
-    errors = table[list(SHOWN)].to_numpy(dtype=float)
-    errors = errors[np.isfinite(errors)]
+    rows = [[table.get(name) for name in controllers] for table in tables.values()]
+    peaks = {
+        joint: np.array([[_peak(cell, joint) for cell in row] for row in rows]) for joint in SHOWN
+    }
+    errors = np.concatenate([values[np.isfinite(values)] for values in peaks.values()])
     norm = LogNorm(errors.min(), errors.max()) if errors.size else LogNorm(1e-3, 1.0)
     for axes, joint in zip(panels, SHOWN, strict=True):
-        values = table[joint].unstack("controller").reindex(index=scenarios, columns=controllers)
-        image = axes.imshow(values, cmap=SEQUENTIAL, norm=norm, aspect="auto")
-        _write_cells(axes, table, values, norm)
+        image = axes.imshow(peaks[joint], cmap=SEQUENTIAL, norm=norm, aspect="auto")
+        _write_cells(axes, rows, peaks[joint], norm)
         axes.set_xticks(
             range(len(controllers)), [look(name).label for name in controllers], rotation=25
         )
         for label in axes.get_xticklabels():
             label.set_horizontalalignment("right")
-        axes.set_yticks(range(len(scenarios)), scenarios)
+        axes.set_yticks(range(len(tables)), list(tables))
         axes.grid(visible=False)
         axes.set_title(joint)
     bar = figure.colorbar(image, ax=panels, shrink=0.9)
@@ -62,23 +64,25 @@ def heat_map(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _write_cells(axes: Axes, table: pd.DataFrame, values: pd.DataFrame, norm: LogNorm) -> None:
+def _peak(cell: ControllerOverview | None, joint: str) -> float:
+    return np.nan if cell is None else cell.joints[joint].peak.value
+
+
+def _write_cells(
+    axes: Axes, rows: list[list[ControllerOverview | None]], peaks: Array, norm: LogNorm
+) -> None:
     """The error of each cell in milliradians, and how many fell."""
-    for (row, column), value in np.ndenumerate(values.to_numpy(dtype=float)):
-        key = (values.index[row], values.columns[column])
-        if not np.isfinite(value):
-            text = _why_empty(table.loc[key]) if key in table.index else ""
-            axes.text(column, row, text, ha="center", va="center", fontsize=6)
+    for (row, column), value in np.ndenumerate(peaks):
+        cell, color = rows[row][column], "black"
+        if cell is None:
             continue
-        fallen = int(table.loc[key, "fell"])
-        text = f"{1e3 * value:.0f}" + (f"\n{fallen} fell" if fallen else "")
-        light = np.dot(colormaps[SEQUENTIAL](float(norm(value)))[:3], (0.3, 0.6, 0.1)) > 0.5
-        color = "black" if light else "white"
+        if np.isfinite(value):
+            text = f"{1e3 * value:.0f}" + (f"\n{cell.fell} fell" if cell.fell else "")
+            light = np.dot(colormaps[SEQUENTIAL](float(norm(value)))[:3], (0.3, 0.6, 0.1)) > 0.5
+            color = "black" if light else "white"
+        else:
+            text = "all\nfell" if cell.fell == cell.robots else "no\nstride"
         axes.text(column, row, text, ha="center", va="center", fontsize=6, color=color)
-
-
-def _why_empty(row: pd.Series) -> str:
-    return "all\nfell" if row["fell"] == row["robots"] else "no\nstride"
 
 
 @styled

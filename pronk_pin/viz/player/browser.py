@@ -15,7 +15,6 @@ import shutil
 import subprocess
 import time
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from ...errors import NoBrowser
@@ -66,7 +65,7 @@ class Browser:
         self.errors: list[str] = []
         self._resources = contextlib.ExitStack()
         profile = self._resources.enter_context(temporary_folder())
-        command = [self._program, *_FLAGS, f"--user-data-dir={profile}", "about:blank"]
+        command = [self._program, *_FLAGS, f"--user-data-dir={profile}", "--no-startup-window"]
         command.insert(1, f"--window-size={width},{height}")
         if os.geteuid() == 0:
             command.insert(1, "--no-sandbox")  # which it refuses to have for root, in containers
@@ -96,12 +95,7 @@ class Browser:
     def __enter__(self) -> Browser:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def call(self, method: str, **params: Any) -> dict[str, Any]:
@@ -180,15 +174,8 @@ class Browser:
 
     def _attach(self) -> None:
         """Speak with the page from here on."""
-        while not (
-            pages := [
-                target
-                for target in self.call("Target.getTargets")["targetInfos"]
-                if target["type"] == "page"
-            ]
-        ):
-            time.sleep(0.05)
-        attached = self.call("Target.attachToTarget", targetId=pages[0]["targetId"], flatten=True)
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")

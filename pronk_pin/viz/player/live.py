@@ -17,14 +17,12 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-import json
 import socket
 import threading
 import webbrowser
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from string import Template
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -40,7 +38,7 @@ from ...errors import InvalidInput, PortUnavailable, PronkError
 from ...robot import as_array, as_q
 from ..scenes import CHANNELS, Menu, Scene
 from .hosts import Hosts, url_of
-from .page import page, player_source, viewer_source
+from .page import page, player_source, script_json, viewer_source
 from .scene_encoding import film_blob, robot_blob, row_bytes, stream_row
 
 PORTS = range(7000, 7100)
@@ -149,12 +147,7 @@ class LiveServer:
     def __enter__(self) -> LiveServer:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def _repr_html_(self) -> str:
@@ -212,7 +205,7 @@ class LiveServer:
         self.send(stream_row(self.scene, time))
 
     def send(self, row: bytes) -> None:
-        """Hand an instant (see `documents.row_bytes`) to the open pages, and return at once."""
+        """Hand an instant (see `row_bytes`) to the open pages, and return at once."""
         self._last = row
         self._loop.call_soon_threadsafe(self._broadcast, row)
 
@@ -239,7 +232,7 @@ class LiveServer:
     def _application(self) -> tornado.web.Application:
         options = {name: list(values) for name, values in self.menu.options.items()}
         start = Template(_START).substitute(
-            options=_json(options), first=_json(dict(self.menu.first))
+            options=script_json(options), first=script_json(dict(self.menu.first))
         )
         script = "text/javascript; charset=utf-8"
         served: list[tuple[str, type[tornado.web.RequestHandler], dict[str, Any]]] = [
@@ -254,12 +247,12 @@ class LiveServer:
 
     async def film(self, choice: dict[str, str]) -> bytes:
         """The film of a choice; films are made one after the other, aside from the pages."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._worker, self._film, choice)
 
-    def _film(self, choice: dict[str, str]) -> bytes:
-        first = choice == dict(self.menu.first)
-        return film_blob(self.scene if first else self.menu.scene(choice))
+        def make() -> bytes:
+            first = choice == dict(self.menu.first)
+            return film_blob(self.scene if first else self.menu.scene(choice))
+
+        return await asyncio.get_running_loop().run_in_executor(self._worker, make)
 
 
 class _Application(tornado.web.Application):
@@ -381,11 +374,6 @@ def _text(text: str, kind: str) -> dict[str, Any]:
     return {"data": text.encode(), "kind": kind}
 
 
-def _json(value: object) -> str:
-    """JSON that may stand in a `<script>`."""
-    return json.dumps(value).replace("<", "\\u003c")
-
-
 def _no_host(host: str, error: Exception) -> InvalidInput:
     reason = getattr(error, "strerror", None) or error
     return InvalidInput(
@@ -399,10 +387,7 @@ def known_port(port: int | None) -> int | None:
     Raises:
         InvalidInput: There is no such port.
     """
-    port = none_or(whole, "port", port)
-    if port is not None and not 0 <= port <= 65535:
-        raise InvalidInput(f"a port is a number from 0 to 65535, not {port}")
-    return port
+    return none_or(whole, "port", port, Interval(0, 65535))
 
 
 def _bind(host: str, port: int | None) -> list[socket.socket]:

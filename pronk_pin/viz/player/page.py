@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import json
 from importlib import resources
 from string import Template
 
@@ -28,6 +29,11 @@ def viewer_source() -> str:
 def player_source() -> str:
     """The player, one JavaScript file."""
     return _data("player.js")
+
+
+def script_json(value: object) -> str:
+    """JSON that may stand in a `<script>`."""
+    return json.dumps(value).replace("<", "\\u003c")
 
 
 def _data(name: str) -> str:

@@ -8,13 +8,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
+from ..._checks import Interval, real
 from ..._checks import path as known_path
-from ..._checks import real
 from ...errors import InvalidInput
 from ...storage import write_file
 from ..scenes import Choice, Menu, Scene
-from .page import page, player_source, viewer_source
+from .page import page, player_source, script_json, viewer_source
 from .scene_encoding import FPS, film_blob, robot_blob
+
+RATE = Interval(0, 1000, above=True)
+"""Frames for each second."""
 
 LARGEST = 4_900_000
 """Size that a file keeps below [bytes], unless its first film alone is larger."""
@@ -55,7 +58,7 @@ def write_replay(shown: Scene | Menu, path: Path | str, *, fps: float = FPS) -> 
 
     Raises:
         FileProblem: The file cannot be written.
-        InvalidInput: fps is not positive.
+        InvalidInput: fps is not in `RATE`.
     """
     path = known_path("path", path)
     return write_file(path, replay_html(shown, fps=fps), remedy="choose another path")
@@ -63,8 +66,7 @@ def write_replay(shown: Scene | Menu, path: Path | str, *, fps: float = FPS) -> 
 
 def replay_html(shown: Scene | Menu, *, fps: float = FPS) -> str:
     """The text of the file that `write_replay` writes."""
-    if not 0.0 < real("fps", fps) <= 1000.0:
-        raise InvalidInput(f"fps must be positive, not {fps}; and 1000 at most")
+    fps = real("fps", fps, RATE)
     menu = Menu.of(shown)
     first = menu.scene()
     frame = page(
@@ -90,9 +92,9 @@ def replay_html(shown: Scene | Menu, *, fps: float = FPS) -> str:
         held.append(choice)
     start = Template(_START).substitute(
         robot=robot,
-        films=_json(films),
-        options=_json(_options(menu, held)),
-        first=_json(dict(menu.first)),
+        films=script_json(films),
+        options=script_json(_options(menu, held)),
+        first=script_json(dict(menu.first)),
     )
     return frame.replace("$start", start, 1)
 
@@ -107,8 +109,3 @@ def _options(menu: Menu, held: Sequence[Choice]) -> dict[str, list[str]]:
 
 def _text(blob: bytes) -> str:
     return base64.b64encode(blob).decode("ascii")
-
-
-def _json(value: object) -> str:
-    """JSON that may stand in a `<script>`."""
-    return json.dumps(value).replace("<", "\\u003c")

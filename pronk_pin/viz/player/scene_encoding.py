@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 
 from ..._typing import Array
 from ..figure_style import SEQUENTIAL
-from ..scenes import GHOST_COLOR, Color, Mesh, Scene, Track
+from ..scenes import GHOST_COLOR, Scene, Track
 from .packing import pack
 
 FPS = 60.0
@@ -22,13 +22,9 @@ _USE_STEPS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 
 
 def robot_blob(scene: Scene) -> bytes:
-    """Static part of a scene for the page: meshes, joints, names, colours."""
+    """Static part of a scene for the page: shapes, joints, names, colours."""
     look, robot = scene.appearance, scene.robot
-    meshes: list[Mesh] = []
-    for part in look.parts:
-        if not any(part.mesh is mesh for mesh in meshes):
-            meshes.append(part.mesh)
-    index = {id(mesh): i for i, mesh in enumerate(meshes)}
+    shapes = list(dict.fromkeys(part.shape for part in look.parts))
     names = [joint.name for joint in look.joints]
     return pack(
         {
@@ -46,12 +42,12 @@ def robot_blob(scene: Scene) -> bytes:
                     "name": part.name,
                     "joint": part.joint,
                     "placement": _matrix(part.placement),
-                    "mesh": index[id(part.mesh)],
-                    "color": css(part.color),
+                    "shape": shapes.index(part.shape),
+                    "color": to_hex(part.color),
                 }
                 for part in look.parts
             ],
-            "meshes": [{"vertices": m.vertices, "faces": m.faces} for m in meshes],
+            "shapes": [vars(shape) for shape in shapes],
             "jointNames": [name.removesuffix("_joint") for name in names],
             "shown": _shown_joint(names),
             "legs": list(robot.legs),
@@ -97,17 +93,12 @@ def row_bytes(scene: Scene, rows: list[dict[str, Array]], view: Array) -> bytes:
     return np.concatenate(values).astype("<f4").tobytes()
 
 
-def css(color: Color) -> str:
-    """A colour as `#rrggbb`."""
-    return str(to_hex(color))
-
-
 def _track(track: Track, row: dict[str, Array]) -> dict[str, Any]:
     color = track.color or (GHOST_COLOR if track.ghost else None)
     return {
         "name": track.name,
         "ghost": track.ghost,
-        "color": css(color) if color else None,
+        "color": to_hex(color) if color else None,
         "caption": track.caption,
         "marks": [list(mark) for mark in track.marks],
         "channels": list(track.channels),

@@ -78,15 +78,12 @@ def play(
     object or a mapping with `t` and `q`, and perhaps `lam`, forces of the ground on all feet in
     the world frame [N], and `tau`, torques [N m]: a `Motion` of a gait, for example.
 
+    Other arguments are those of `show`.
+
     Args:
-        robot: The robot.
         trajectory: The motion.
         reference: A motion to compare it with, shown as a translucent ghost.
         beside: A motion to show half a metre beside it.
-        friction: Friction coefficient of the ground; with forces, their cones are drawn.
-        title: Heading of the page.
-        port: Port of the page; without it a free one is found.
-        open_browser: Open the page in the default browser; not in a notebook, which shows it.
         block: Wait for Ctrl-C; by default so in a script, and not in an interactive session.
         duration: End after this time [s] instead of waiting for Ctrl-C.
 
@@ -111,17 +108,7 @@ def play(
 
 
 def track_of(robot: Robot, trajectory: Any, name: str, **looks: Any) -> Track:
-    """A trajectory as a track: see `play`.
-
-    Args:
-        robot: The robot.
-        trajectory: The motion.
-        name: Name of the track.
-        looks: Further attributes of the `Track`.
-
-    Raises:
-        InvalidInput: It is not a trajectory of this robot.
-    """
+    """A trajectory of `play` as a track of that name, with further attributes of the `Track`."""
     if isinstance(trajectory, Track):
         return trajectory
     if isinstance(trajectory, tuple) and len(trajectory) == 2:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,12 +14,12 @@ import numpy as np
 from PIL import Image
 from tqdm import tqdm
 
-from ..._checks import flag, none_or, real, text, whole
+from ..._checks import NOT_NEGATIVE, POSITIVE, flag, none_or, real, text, whole
 from ...errors import FileProblem, InvalidInput, cannot_write
 from ...storage import partial_path, temporary_folder, write_file
 from ..scenes import Scene
 from .browser import Browser
-from .replay import write_replay
+from .replay import RATE, write_replay
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,7 @@ class Film:
 
     def __post_init__(self) -> None:
         flag("plots", self.plots)
-        for name, most in (("fps", 1000.0), ("rate", 1000.0)):
-            if not 0.0 < real(name, getattr(self, name)) <= most:
-                raise InvalidInput(
-                    f"{name} must be positive, not {getattr(self, name)}; and {most:g} at most"
-                )
+        real("fps", self.fps, RATE), real("rate", self.rate, RATE)
         for name in ("width", "height"):
             if not 64 <= whole(name, getattr(self, name)) <= 4096 or getattr(self, name) % 2:
                 raise InvalidInput(
@@ -60,9 +56,7 @@ class Film:
                 )
         if text("color", self.color) not in ("", "error", "torque"):
             raise InvalidInput(f"color='{self.color}'; choose error or torque, or leave it out")
-        real("at", self.at), none_or(real, "seconds", self.seconds)
-        if self.at < 0.0 or (self.seconds is not None and self.seconds <= 0.0):
-            raise InvalidInput("at must not be negative, and seconds must be positive")
+        real("at", self.at, NOT_NEGATIVE), none_or(real, "seconds", self.seconds, POSITIVE)
 
     def times(self, duration: float) -> list[float]:
         """The instants of the film of a scene of that duration [s], from its beginning."""
@@ -81,8 +75,8 @@ def write_png(scene: Scene, path: Path | str, film: Film | None = None) -> Path:
     """
     film = Film() if film is None else film
     path = _writable(path)
-    with _Stage(scene, film) as stage:
-        write_file(path, stage.picture(film.at))
+    with _stage(scene, film) as picture:
+        write_file(path, picture(film.at))
     return path
 
 
@@ -108,48 +102,34 @@ def write_film(
         raise InvalidInput(f"films are written as .gif or .mp4, not as '{path.name}'")
     if path.suffix == ".mp4":
         _encoder()
-    with _Stage(scene, film) as stage:
-        pictures = stage.pictures(film.times(scene.duration), progress=progress)
+    with _stage(scene, film) as picture:
+        times = tqdm(
+            film.times(scene.duration), desc="drawing", unit=" frames", disable=not progress
+        )
+        pictures = (Image.open(io.BytesIO(picture(time))).convert("RGB") for time in times)
         (_write_gif if path.suffix == ".gif" else _write_mp4)(path, pictures, film)
     return path
 
 
-class _Stage:
-    """A scene's page in a browser, made for pictures; a context manager."""
+@contextlib.contextmanager
+def _stage(scene: Scene, film: Film) -> Iterator[Callable[[float], bytes]]:
+    """A scene's page in a browser, made for pictures: the page at a time [s] as PNG."""
+    with contextlib.ExitStack() as resources:
+        # As many frames as the film shows; between them the page interpolates.
+        page = resources.enter_context(temporary_folder()) / "page.html"
+        write_replay(scene, page, fps=max(60.0, film.fps / film.rate))
+        browser = resources.enter_context(Browser(film.width, film.height))
+        browser.open(f"{page.as_uri()}#t={film.at}")
+        kind = "film plots" if film.plots else "film"
+        browser.run(
+            f"document.body.className = '{kind}'; player.colour('{film.color}'); player.fit()"
+        )
 
-    def __init__(self, scene: Scene, film: Film) -> None:
-        self._resources = contextlib.ExitStack()
-        self._browser: Browser | None = None
-        try:
-            # As many frames as the film shows; between them the page interpolates.
-            page = self._resources.enter_context(temporary_folder()) / "page.html"
-            write_replay(scene, page, fps=max(60.0, film.fps / film.rate))
-            self._browser = self._resources.enter_context(Browser(film.width, film.height))
-            self._browser.open(f"{page.as_uri()}#t={film.at}")
-            kind = "film plots" if film.plots else "film"
-            self._browser.run(
-                f"document.body.className = '{kind}'; player.colour('{film.color}'); player.fit()"
-            )
-        except BaseException:
-            self.__exit__()
-            raise
+        def picture(time: float) -> bytes:
+            browser.run(f"player.seek({time})")
+            return browser.screenshot()
 
-    def __enter__(self) -> _Stage:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self._resources.close()
-
-    def picture(self, time: float) -> bytes:
-        """The page at a time from the scene's beginning [s], as PNG."""
-        assert self._browser is not None
-        self._browser.run(f"player.seek({time})")
-        return self._browser.screenshot()
-
-    def pictures(self, times: list[float], *, progress: bool) -> Iterator[Image.Image]:
-        """The page at some times, one after the other."""
-        for time in tqdm(times, desc="drawing", unit=" frames", disable=not progress):
-            yield Image.open(io.BytesIO(self.picture(time))).convert("RGB")
+        yield picture
 
 
 def _write_gif(path: Path, pictures: Iterator[Image.Image], film: Film) -> None:

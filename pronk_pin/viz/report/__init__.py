@@ -4,10 +4,9 @@ Comes in: `Results`.
 Goes out: report.html, report.md, and their figures.
 """
 
-from .report import command, scenario_figures, write_figures, write_report
+from .report import scenario_figures, write_figures, write_report
 
 __all__ = [
-    "command",
     "scenario_figures",
     "write_figures",
     "write_report",

@@ -5,8 +5,8 @@ One document, written as a self-contained report.html and as report.md with its 
 
 from __future__ import annotations
 
-import shlex
 import textwrap
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from ...compare import ForeignRobot, Results
-from ...compare.experiment import SUITES, load_suite
 from ...compare.metrics import (
     CONFIDENCE,
     LEARNER,
@@ -28,6 +27,7 @@ from ...compare.metrics import (
 )
 from ...compare.report import (
     SHOWN,
+    Overview,
     answer,
     answer_in_words,
     beside_note,
@@ -75,8 +75,16 @@ _READING = (
 )
 
 
-def write_report(results: Results) -> Path:
+_AGAIN = 'run_experiment(Results.load(folder).experiment, "again")'
+"""How Python makes a result again."""
+
+
+def write_report(results: Results, *, command: str = "") -> Path:
     """Write report.html, report.md and its figures into the results folder.
+
+    Args:
+        results: The results.
+        command: The command that makes them again; without one the report says how Python does.
 
     Returns:
         The path of report.html.
@@ -84,7 +92,7 @@ def write_report(results: Results) -> Path:
     Raises:
         FileProblem: The summary or the strides are missing or damaged, or it cannot be written.
     """
-    document = report(results)
+    document = report(results, command=command)
     path = results.write("report.html", document.to_html())
     folder = results.folder / FIGURES
     try:
@@ -97,45 +105,24 @@ def write_report(results: Results) -> Path:
     return path
 
 
-def report(results: Results) -> Document:
-    """The report as a document."""
+def report(results: Results, *, command: str = "") -> Document:
+    """The report as a document, see `write_report`."""
     summary, scenarios = results.summary(), families(results.experiment.scenarios)
     document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
-    table = answer(summary)
-    document.text(answer_in_words(summary, table=table), "verdict")
+    tables = answer(summary)
+    document.text(answer_in_words(summary, tables=tables), "verdict")
     if len(scenarios) > 1:
-        _all_scenarios(document, results, table)
+        _all_scenarios(document, results, tables)
     for scenario in scenarios:
-        _world(document, results, summary, table, scenario)
+        _world(document, results, summary, tables[scenario], scenario)
     if results.foreign is not None:
         _foreign_robot(document, results.foreign)
     document.heading("How to read the numbers", "statistics")
     document.text(_READING)
     document.heading("Known limitations", "limits")
     document.bullets(limitations(results))
-    _provenance(document, results)
+    _provenance(document, results, command)
     return document
-
-
-def command(results: Results) -> str:
-    """The command that makes this result again."""
-    experiment = results.experiment
-    for name in SUITES:
-        if load_suite(name) == experiment:
-            return f"pronk-pin compare --suite {name}"
-    words = ["pronk-pin compare", f"--robot {experiment.robot}"]
-    words += ["--speeds " + " ".join(f"{speed:g}" for speed in experiment.speeds)]
-    words += ["--controllers " + " ".join(experiment.controllers)]
-    words += ["--scenarios " + " ".join(experiment.scenarios)]
-    words += ["--seeds " + " ".join(map(str, experiment.seeds))]
-    words += [f"--base {experiment.base}"]
-    words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []
-    schedule = experiment.schedule
-    words += [
-        f"--schedule.{name} {getattr(schedule, name):g}"
-        for name in ("startup", "baseline", "learning", "scatter")
-    ]
-    return " ".join(words)
 
 
 def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
@@ -188,25 +175,24 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     ]
 
 
-def _all_scenarios(document: Document, results: Results, table: pd.DataFrame) -> None:
+def _all_scenarios(document: Document, results: Results, tables: Mapping[str, Overview]) -> None:
     """What comes out over all scenarios: a row a scenario, the heat map, and the learning."""
     document.heading("All scenarios", "scenarios")
-    controllers = set(table.index.get_level_values("controller"))
-    if LEARNER in controllers:
+    if any(LEARNER in table for table in tables.values()):
         document.text("a row a scenario: peak error under learning (ILC) beside PD and the model.")
-        document.table(report_tables.by_scenario(table))
-    for name, (figure, caption) in _suite_figures(results, table).items():
+        document.table(report_tables.by_scenario(tables))
+    for name, (figure, caption) in _suite_figures(results, tables).items():
         document.picture(name, figure, caption)
 
 
 def _suite_figures(
-    results: Results, table: pd.DataFrame | None = None
+    results: Results, tables: Mapping[str, Overview] | None = None
 ) -> dict[str, tuple[Figure, str]]:
     """Figures over all scenarios with their captions."""
-    table = answer(results.summary()) if table is None else table
+    tables = answer(results.summary()) if tables is None else tables
     return {
         "heat-map": (
-            figures.heat_map(table),
+            figures.heat_map(tables),
             "Mean peak stance error by scenario and controller, in milliradians.",
         ),
         **_learning_figures(results),
@@ -231,7 +217,7 @@ def _learning_figures(results: Results) -> dict[str, tuple[Figure, str]]:
 
 
 def _world(
-    document: Document, results: Results, summary: pd.DataFrame, table: pd.DataFrame, scenario: str
+    document: Document, results: Results, summary: pd.DataFrame, table: Overview, scenario: str
 ) -> None:
     """The section about one scenario; the first one has all figures."""
     scenarios = families(results.experiment.scenarios)
@@ -239,10 +225,10 @@ def _world(
     where = f"{len(drawn)} sampled scenarios" if sampled(scenario) else "scenario"
     document.heading(f'Controllers in the {where} "{scenario}"', scenario)
     if len(scenarios) > 1:
-        document.text(verdict(summary, scenario=scenario, table=table.loc[scenario]))
-    document.table(report_tables.errors(table.loc[scenario]))
-    document.table(report_tables.motion(table.loc[scenario]))
-    units = units_of_intervals(table.loc[scenario])
+        document.text(verdict(summary, scenario=scenario, table=table))
+    document.table(report_tables.errors(table))
+    document.table(report_tables.motion(table))
+    units = units_of_intervals(table)
     document.text(f"Intervals are drawn over the {units}." if units else "", "note")
     if sampled(scenario):
         _sampled(document, results, summary, scenario)
@@ -253,7 +239,7 @@ def _world(
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
     if {"pd", LEARNER} <= set(results.experiment.controllers):
         document.heading("Table I, beside the paper's", f"{scenario}-table", level=3)
-        _beside(document, beside_the_paper(summary, scenario=scenario), table.loc[scenario])
+        _beside(document, beside_the_paper(summary, scenario=scenario), table)
     if LEARNER in results.experiment.controllers:
         document.heading("Before and after, and what was learned", f"{scenario}-learned", level=3)
         if "tracking" not in found:
@@ -263,7 +249,7 @@ def _world(
                 document.picture(name, found[name], _CAPTIONS[name])
 
 
-def _beside(document: Document, beside: pd.DataFrame, table: pd.DataFrame) -> None:
+def _beside(document: Document, beside: pd.DataFrame, table: Overview) -> None:
     """Our errors beside the paper's Table I, and who is missing there."""
     document.text(beside_note(table), "note")
     if beside.empty:
@@ -330,13 +316,15 @@ def _sampled(document: Document, results: Results, summary: pd.DataFrame, scenar
         document.picture(name, figure, caption)
 
 
-def _provenance(document: Document, results: Results) -> None:
+def _provenance(document: Document, results: Results, command: str) -> None:
     document.heading("Where these numbers come from", "provenance")
     document.text(
-        "Made again by this command, to the bit with the same versions, the same BLAS kernel and a "
-        "processor of the same family:"
+        f"Made again by this {'command' if command else 'code'}, to the bit with the same "
+        "versions, the same BLAS kernel and a processor of the same family:"
     )
-    lines = textwrap.wrap(command(results), 96, break_long_words=False, break_on_hyphens=False)
+    lines = [_AGAIN]
+    if command:
+        lines = textwrap.wrap(command, 96, break_long_words=False, break_on_hyphens=False)
     document.text(" \\\n    ".join(lines), "code")
     document.text(
         "Every number stands in `summary.csv`, every stride in `strides/`, when they were made and "

@@ -2,38 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
-from ...compare.metrics import LEARNER, RIVAL
-from ...compare.report import SHOWN, SHOWN_PARAMETERS, against_model, beat_text, between, number
+from ...compare.metrics import LEARNER, RIVAL, Interval
+from ...compare.report import (
+    SHOWN,
+    SHOWN_PARAMETERS,
+    Overview,
+    against_model,
+    beat_text,
+    between,
+    number,
+)
 from ...parity import Parity, Row, format_value, merged
 from ..figure_style import in_order
 from ..figures import LABELS
 
 
-def by_scenario(table: pd.DataFrame) -> pd.DataFrame:
-    """One row a world about `ilc`, beside `pd` and `model`, from the table of `answer`."""
+def by_scenario(tables: Mapping[str, Overview]) -> pd.DataFrame:
+    """One row a world about `ilc`, beside `pd` and `model`, from the overviews of `answer`."""
     rows = {}
-    for world, row in table.xs(LEARNER, level="controller").iterrows():
-        cells: dict[str, str] = {}
+    for world, table in tables.items():
+        if LEARNER not in table:
+            continue
+        row, cells = table[LEARNER], {}
         for joint in SHOWN:
             for other in ("pd", RIVAL):
-                if (world, other) in table.index:
-                    value = table.loc[(world, other), joint]
+                if other in table:
+                    value = table[other].joints[joint].peak.value
                     cells[f"{joint} [rad]: {LABELS[other]}"] = number(value, ".4f")
-            cells[f"{joint} [rad]: ILC"] = _with_interval(row, joint, ".4f")
+            cells[f"{joint} [rad]: ILC"] = _with_interval(row.joints[joint].peak, ".4f")
         cells["better than model (calf/thigh)"] = against_model(row)
         cells["strides to beat it"] = beat_text(row)
-        rows[str(world)] = cells
+        rows[world] = cells
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def _with_interval(row: pd.Series, name: str, form: str) -> str:
+def _with_interval(interval: Interval, form: str) -> str:
     """A mean with its interval: "0.0224 (0.0216 to 0.0237)"."""
-    value, ends = number(row.get(name, float("nan")), form), between(row, name, form)
+    value, ends = number(interval.value, form), between(interval, form)
     return value if ends == "-" else f"{value} ({ends})"
 
 
@@ -88,33 +98,34 @@ def each_scenario(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(shown, index=table.index.rename(None))
 
 
-def errors(table: pd.DataFrame) -> pd.DataFrame:
-    """Errors of the controllers in a world, with intervals, from that of `answer`."""
+def errors(table: Overview) -> pd.DataFrame:
+    """Errors of the controllers in a world, with intervals."""
     rows = {}
-    for name, row in table.iterrows():
+    for name, row in table.items():
         cells: dict[str, str] = {}
         for joint in SHOWN:
-            cells[f"{joint}: peak [rad]"] = _with_interval(row, joint, ".4f")
-            cells[f"{joint}: less than PD"] = _with_interval(row, f"{joint}_reduction", ".0%")
-            cells[f"{joint}: wins against model"] = _with_interval(row, f"{joint}_wins", ".0%")
-        rows[LABELS.get(str(name), str(name))] = cells
+            own = row.joints[joint]
+            cells[f"{joint}: peak [rad]"] = _with_interval(own.peak, ".4f")
+            cells[f"{joint}: less than PD"] = _with_interval(own.reduction, ".0%")
+            cells[f"{joint}: wins against model"] = _with_interval(own.wins, ".0%")
+        rows[LABELS.get(name, name)] = cells
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def motion(table: pd.DataFrame) -> pd.DataFrame:
-    """What else is to be known of the controllers in a world, from that of `answer`."""
+def motion(table: Overview) -> pd.DataFrame:
+    """What else is to be known of the controllers in a world."""
     rows = {}
-    for name, row in table.iterrows():
-        cells = {f"{joint}: RMS [rad]": number(row[f"{joint}_rms"], ".4f") for joint in SHOWN}
+    for name, row in table.items():
+        cells = {f"{joint}: RMS [rad]": number(row.joints[joint].rms, ".4f") for joint in SHOWN}
         cells["better than model (calf/thigh)"] = against_model(row)
         cells["strides to beat it"] = beat_text(row)
-        cells["strides to converge"] = number(row["strides"], ".0f")
-        cells["feedback's share"] = number(row["feedback"], ".0%")
-        cells["cost of transport"] = number(row["cost"], ".2f")
-        cells["speed error [m/s]"] = number(row["speed_error"], ".3f")
-        cells["apex error [mm]"] = number(1e3 * row["apex_error"], ".1f")
-        cells["upright"] = f"{row['upright']:.0f} of {row['robots']:.0f}"
-        rows[LABELS.get(str(name), str(name))] = cells
+        cells["strides to converge"] = number(row.settled, ".0f")
+        cells["feedback's share"] = number(row.feedback, ".0%")
+        cells["cost of transport"] = number(row.cost, ".2f")
+        cells["speed error [m/s]"] = number(row.speed_error, ".3f")
+        cells["apex error [mm]"] = number(1e3 * row.apex_error, ".1f")
+        cells["upright"] = f"{row.upright} of {row.robots}"
+        rows[LABELS.get(name, name)] = cells
     return pd.DataFrame.from_dict(rows, orient="index")
 
 

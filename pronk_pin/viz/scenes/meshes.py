@@ -1,15 +1,17 @@
 """Visual geometry of the robot, with meshes light enough for a page.
 
 The A1's meshes have 216,000 triangles, most of them for screws. They are thinned out once in a
-process by clustering vertices; a page with two robots then fits into two megabytes.
+process; a page with two robots then fits into two megabytes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from typing import TypeAlias
 
 import coal
+import fast_simplification
 import numpy as np
 import pinocchio as pin
 
@@ -17,8 +19,8 @@ from ..._typing import Array, IntArray
 from ...errors import FileProblem, InvalidInput
 from ...robot import Robot
 
-CELL = 0.005
-"""Edge of the cells in which a mesh's vertices are merged [m]."""
+MOST_TRIANGLES = 2000
+"""Triangles that a mesh is thinned out to, as far as that leaves its shape."""
 
 SMALLEST = 0.005
 """Visuals smaller than this are left out [m]: the A1's URDF marks its frames with 1 mm boxes."""
@@ -37,6 +39,22 @@ class Mesh:
     faces: IntArray
 
 
+@dataclass(frozen=True)
+class Solid:
+    """A shape that the page draws itself, about the origin.
+
+    Attributes:
+        kind: "box", "sphere" or "cylinder".
+        size: Edges of a box, radius of a sphere, radius and length along z of a cylinder [m].
+    """
+
+    kind: str
+    size: tuple[float, ...]
+
+
+Shape: TypeAlias = Mesh | Solid
+
+
 @dataclass(frozen=True, eq=False)
 class Part:
     """One visual of the robot.
@@ -45,14 +63,14 @@ class Part:
         name: Name of Pinocchio's geometry object.
         joint: Number of the joint that moves it, in Pinocchio's order; 1 is the floating base.
         placement: Its pose in the joint's frame, shape (4, 4).
-        mesh: Its surface in its own frame; parts of the same shape share one.
+        shape: Its surface in its own frame; parts of the same mesh share one.
         color: Red, green and blue of the URDF, each in [0, 1].
     """
 
     name: str
     joint: int
     placement: Array
-    mesh: Mesh
+    shape: Shape
     color: tuple[float, float, float]
 
 
@@ -86,11 +104,6 @@ class Appearance:
     robot: Robot
     joints: tuple[Joint, ...]
     parts: tuple[Part, ...]
-
-    @cached_property
-    def tips(self) -> tuple[int, ...]:
-        """Number of the joint that carries each foot."""
-        return tuple(int(self.robot.model.frames[foot].parentJoint) for foot in self.robot.foot_ids)
 
     def feet(self, q: Array) -> Array:
         """Centres of the feet in the world [m], shape (n, 4, 3), of configurations (n, 19)."""
@@ -126,11 +139,12 @@ def appearance(robot: Robot) -> Appearance:
     thinned: dict[tuple[str, tuple[float, ...]], Mesh] = {}
     parts = []
     for item in model.geometryObjects:
-        mesh = _surface(item, thinned)
-        if np.ptp(mesh.vertices, axis=0).max() > SMALLEST:
+        item.geometry.computeLocalAABB()
+        extent = item.geometry.aabb_local
+        if np.max(extent.max_ - extent.min_) > SMALLEST:
             r, g, b = (float(c) for c in item.meshColor[:3])
-            placement = item.placement.homogeneous
-            parts.append(Part(item.name, int(item.parentJoint), placement, mesh, (r, g, b)))
+            place, shape = item.placement.homogeneous, _shape(item, thinned)
+            parts.append(Part(item.name, int(item.parentJoint), place, shape, (r, g, b)))
     return Appearance(robot, _joints(robot), tuple(parts))
 
 
@@ -151,17 +165,19 @@ def _joints(robot: Robot) -> tuple[Joint, ...]:
     return tuple(found)
 
 
-def _surface(item: pin.GeometryObject, thinned: dict[tuple[str, tuple[float, ...]], Mesh]) -> Mesh:
-    """The surface of a visual; `thinned` remembers the meshes that several visuals share."""
+def _shape(item: pin.GeometryObject, thinned: dict[tuple[str, tuple[float, ...]], Mesh]) -> Shape:
+    """The shape of a visual; `thinned` remembers the meshes that several visuals share."""
     shape = item.geometry
     if isinstance(shape, coal.Sphere):
-        return sphere(shape.radius)
+        return Solid("sphere", (shape.radius,))
     if isinstance(shape, coal.Box):
-        return box(2.0 * np.asarray(shape.halfSide))
+        return Solid("box", tuple((2.0 * shape.halfSide).tolist()))
+    if isinstance(shape, coal.Cylinder):
+        return Solid("cylinder", (shape.radius, 2.0 * shape.halfLength))
     if not isinstance(shape, coal.BVHModelBase):
         raise InvalidInput(
             f"visual '{item.name}' is a {type(shape).__name__}; "
-            "use meshes, boxes or spheres in the URDF"
+            "use meshes, boxes, spheres or cylinders in the URDF"
         )
     key = (item.meshPath, tuple(item.meshScale))
     if key not in thinned:
@@ -171,73 +187,15 @@ def _surface(item: pin.GeometryObject, thinned: dict[tuple[str, tuple[float, ...
     return thinned[key]
 
 
-def sphere(radius: float, *, segments: int = 16) -> Mesh:
-    """A sphere of that radius [m] about the origin, `segments` around its equator."""
-    polar = np.linspace(0.0, np.pi, segments // 2 + 1)[:, None]
-    around = np.linspace(0.0, 2.0 * np.pi, segments + 1)
-    ring = np.ones_like(around)
-    points = (np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar) * ring)
-    return Mesh(
-        radius * np.stack(points, axis=-1).reshape(-1, 3), grid_faces(len(polar), len(ring))
-    )
+def thin(mesh: Mesh, *, most: int = MOST_TRIANGLES) -> Mesh:
+    """Merge the vertices of a mesh where that changes its surface least, to so many triangles.
 
-
-def box(size: Array) -> Mesh:
-    """A box of that size [m], shape (3,), about the origin."""
-    corners = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3, indexing="ij")).reshape(3, 8).T * size
-    quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
-    return Mesh(corners, np.array(faces, dtype=np.intp))
-
-
-def grid_faces(rows: int, columns: int) -> IntArray:
-    """Triangles between the neighbours of a rows x columns grid of vertices, shape (m, 3)."""
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1, 1)
-    lower = corner + np.array([0, columns, 1])
-    upper = corner + np.array([1, columns, columns + 1])
-    return np.concatenate([lower, upper]).astype(np.intp)
-
-
-def thin(mesh: Mesh, *, cell: float = CELL) -> Mesh:
-    """Merge the vertices in each cell of a grid, and drop the triangles that vanish.
-
-    The merged vertex lies where the squared distance to the planes of the triangles around is
-    least (P. Lindstrom, Out-of-core simplification of large polygonal models, 2000); so edges and
-    corners survive, which averaging would round off.
-
-    Args:
-        mesh: The mesh.
-        cell: Edge of a cell [m].
+    By quadric error (M. Garland and P. Heckbert, Surface simplification, 1997), so that edges and
+    corners survive; what would lose its shape keeps more triangles.
     """
-    keys = np.floor((mesh.vertices - mesh.vertices.min(axis=0)) / cell).astype(np.intp)  # (n, 3)
-    _, cluster = np.unique(keys, axis=0, return_inverse=True)
-    cluster = cluster.reshape(-1)  # (n,)
-    vertices = _least_squares_vertices(mesh, cluster, cell)
-    faces = cluster[mesh.faces]  # (m, 3)
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    used, faces = np.unique(faces[first], return_inverse=True)
-    return Mesh(vertices[used], faces.reshape(-1, 3))
-
-
-def _least_squares_vertices(mesh: Mesh, cluster: IntArray, cell: float) -> Array:
-    """Closest point to the planes around each cluster [m], shape (clusters, 3)."""
-    count = int(cluster.max()) + 1
-    mean = np.zeros((count, 3))
-    np.add.at(mean, cluster, mesh.vertices)
-    mean /= np.bincount(cluster)[:, None]
-
-    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)  # (m, 3), its length twice the area
-    corner = cluster[mesh.faces]  # (m, 3)
-    normal, corner, point = np.tile(normal, (3, 1)), corner.T.reshape(-1), np.tile(a, (3, 1))
-    distance = np.sum(normal * (point - mean[corner]), axis=1)  # (3 m,)
-    matrix, vector = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    np.add.at(matrix, corner, normal[:, :, None] * normal[:, None, :])
-    np.add.at(vector, corner, normal * distance[:, None])
-    # Directions that no plane fixes stay at the mean: a flat patch has two, an edge one.
-    weight = 1e-2 * np.trace(matrix, axis1=1, axis2=2) + 1e-30
-    offset = np.linalg.solve(matrix + weight[:, None, None] * np.eye(3), vector[..., None])[..., 0]
-    vertices: Array = mean + np.clip(offset, -cell, cell)
-    return vertices
+    # Files often have a vertex once for each face around it, and a seam would count as an edge.
+    vertices, index = np.unique(mesh.vertices.round(9), axis=0, return_inverse=True)
+    faces = index.reshape(-1)[mesh.faces].astype(np.int32)
+    faces = faces[(np.diff(np.sort(faces)) > 0).all(axis=1)]  # the others have no area
+    target = min(most, len(faces))
+    return Mesh(*fast_simplification.simplify(vertices, faces, target_count=target, agg=3))

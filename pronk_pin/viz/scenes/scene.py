@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..._checks import instance_of, none_or, real, sequence_of, shown, text
+from ..._checks import Interval, instance_of, none_or, real, sequence_of, shown, text
 from ..._typing import Array
 from ...errors import InvalidInput
 from ...robot import Robot, as_numbers, as_robot
@@ -186,9 +186,7 @@ class Scene:
             raise InvalidInput(f"a scene needs tracks of different names, not {names}")
         for track in self.tracks:
             track.check(self.robot)
-        none_or(real, "friction", self.friction)
-        if self.friction is not None and not 0.0 < self.friction < 10.0:
-            raise InvalidInput(f"friction={self.friction}; give a positive coefficient, or None")
+        none_or(real, "friction", self.friction, Interval(0, 10, above=True, below=True))
 
     @cached_property
     def appearance(self) -> Appearance:

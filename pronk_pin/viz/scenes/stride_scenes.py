@@ -115,15 +115,13 @@ class _Reader:
         shown = _cut(strides, choice[STRIDES])
         tracks = [*_pair(robot, gait, shown, look(choice[CONTROLLER]).label)]
         if choice[BESIDE] != ALONE:
-            second = strides if choice[BESIDE] == EARLIER else None
-            if second is None:
-                second = self._strides(choice[BESIDE], scenario, speed)
-                label = f"{look(choice[BESIDE]).label}, beside"
-                cut = _cut(second, choice[STRIDES])
+            if choice[BESIDE] == EARLIER:
+                label, cut = "before learning", _cut_before(strides)
             else:
-                label, cut = "before learning", _cut_before(second)
-            pair = _pair(robot, gait, cut, label)
-            tracks += [replace(track.moved(y=ASIDE), color=_beside(track)) for track in pair]
+                label = f"{look(choice[BESIDE]).label}, beside"
+                cut = _cut(self._strides(choice[BESIDE], scenario, speed), choice[STRIDES])
+            second, planned = (track.moved(y=ASIDE) for track in _pair(robot, gait, cut, label))
+            tracks += [replace(second, color=SECOND_COLOR), planned]
         learned = shown["start"].to_numpy()[shown["learning"].to_numpy() == 1]
         began = float(learned[0] - shown["start"][0]) if learned.size else 0.0
         note = f"; learning starts after {began:.1f} s" if began > 0.0 else ""
@@ -148,10 +146,6 @@ class _Reader:
 def _load(results: Results, controller: str, scenario: str, digest: str) -> xr.Dataset:
     """Strides that are kept as long as the files, by their `digest`, are the same."""
     return results.all_strides(controller=controller, scenario=scenario)
-
-
-def _beside(track: Track) -> tuple[float, float, float] | None:
-    return None if track.ghost else SECOND_COLOR
 
 
 def _windows(strides: xr.Dataset) -> list[str]:
@@ -242,7 +236,8 @@ class _Samples:
 
     def curve(self, strides: xr.Dataset, name: str) -> Array:
         """A curve at all samples, one after the other, shape (m, ...)."""
-        values = strides[name].transpose(*_order(strides[name]), ...).to_numpy()
+        order = ("stride", "part", "phase", ...)
+        values = strides[name].transpose(*order, missing_dims="ignore").to_numpy()
         if "stride" not in strides[name].dims:
             values = np.broadcast_to(values, (len(self.since), *values.shape))
         return np.asarray(values[self.within], dtype=float)
@@ -275,10 +270,6 @@ class _Samples:
         span = np.maximum(times - before, timestep)
         forces = np.where(times < begin, np.nan, np.array(impulses) / span).T
         return np.asarray(forces.reshape(len(times), 4, 3))
-
-
-def _order(curve: xr.DataArray) -> list[str]:
-    return [name for name in ("stride", "part", "phase") if name in curve.dims]
 
 
 def _measured(robot: Robot, strides: xr.Dataset, name: str) -> Track:

@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 import xarray as xr
 
+from pronk_pin.compare.metrics.metrics import peak_history
 from pronk_pin.compare.metrics.time_to_beat import (
     WINDOW,
     PeakHistory,
     beat_rows,
     beaten,
-    peak_history,
     strides_to_beat,
 )
 

@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from pronk_pin.compare import Results
-from pronk_pin.compare.experiment.manifest import Manifest
 from pronk_pin.compare.metrics import COLUMNS
 from pronk_pin.compare.report.difference import changes, format_changes
+from pronk_pin.compare.results.manifest import Manifest
 from pronk_pin.errors import InvalidInput
 
 

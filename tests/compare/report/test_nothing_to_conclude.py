@@ -7,27 +7,27 @@ import shutil
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
-from pronk_pin.compare import Results, Simulation, summarize
+from pronk_pin.compare import Results, summarize
+from pronk_pin.compare.metrics.metrics import peak_history
 from pronk_pin.compare.metrics.statistics import compare_controllers
-from pronk_pin.compare.metrics.time_to_beat import lessons, peak_history
+from pronk_pin.compare.metrics.time_to_beat import lessons
 from pronk_pin.compare.report.difference import format_changes
 from pronk_pin.compare.report.limitations import limitations
+from pronk_pin.compare.report.overview import overview
 from pronk_pin.compare.report.tables import (
     beside_the_paper,
-    overview,
     sampled_scenarios,
     worst_reduction,
 )
 from pronk_pin.compare.report.verdict import format_suite, format_tables, suite_verdict, verdict
-from pronk_pin.compare.studies.gain_reduction import describe_gains, mean_peaks
+from pronk_pin.compare.studies.gain_reduction import describe_gains
+from pronk_pin.compare.studies.learning_runs import mean_peaks
 from pronk_pin.compare.studies.reproduce import format_reproduction
 from pronk_pin.compare.studies.seeding import LEARNERS, describe_seeding
 from pronk_pin.compare.studies.transfer import describe_transfers
@@ -115,8 +115,8 @@ def test_two_falls_are_no_win_and_no_tie(summary: pd.DataFrame) -> None:
     assert nobody.better is None
     one = compare_controllers(let_fall(summary, "ilc", "model", speed=0.35), **mine)
     assert (one.pairs, one.improvement.value) == (1, 1.0)  # of the one pair that tells
-    row = overview(let_fall(summary), scenario="nominal").loc["ilc"]
-    assert np.isnan(row["calf_model"])
+    calf = overview(let_fall(summary), scenario="nominal")["ilc"].joints["calf"]
+    assert (calf.better, calf.pairs) == (None, 0)
 
 
 def test_the_papers_table_has_no_errors_of_the_fallen(summary: pd.DataFrame) -> None:
@@ -172,8 +172,8 @@ def test_learning_that_was_never_switched_on_is_no_practice(summary: pd.DataFram
 
 def test_a_robot_without_a_finished_stride_neither_stands_nor_fell(summary: pd.DataFrame) -> None:
     summary.loc[(summary["speed"] == 0.35) & (summary["controller"] == "ilc"), "value"] = np.nan
-    row = overview(summary, scenario="nominal").loc["ilc"]
-    assert (row["upright"], row["fell"], row["robots"]) == (1, 0, 2)
+    row = overview(summary, scenario="nominal")["ilc"]
+    assert (row.upright, row.fell, row.robots) == (1, 0, 2)
     text = format_tables(summary, scenario="nominal")
     check_words(text)
     assert "No robot fell. One robot finished no stride." in " ".join(text.split())
@@ -243,7 +243,6 @@ def spoil(results: Results, controller: str, **changed: float) -> None:
             finished = strides["stride"] < strides["count"]
             values = {name: xr.where(finished, value, np.nan) for name, value in changed.items()}
             results.save(cell, strides.assign(values).assign_attrs(strides.attrs))
-    results.summarize()
 
 
 def test_the_summary_counts_what_taught_nothing_and_why(copy: Results) -> None:
@@ -353,10 +352,14 @@ def test_a_transfer_to_where_practice_falls_is_open() -> None:
 
 def test_peaks_of_a_sweep_are_those_of_the_robots_that_stayed_up() -> None:
     peaks = np.ones((2, 5, 12)) * np.array([0.1, 7.0])[:, None, None]
-    log = SimpleNamespace(peak_error=peaks, count=np.array([5, 5]))
 
     def found(upright: list[bool]) -> dict[str, float | int]:
-        return mean_peaks(cast(Simulation, SimpleNamespace(strides=log, upright=np.array(upright))))
+        variables = {
+            "count": ("speed", [5, 5]),
+            "peak_error": (("speed", "stride", "joint"), peaks),
+            "upright": (("speed", "stride"), np.outer(upright, np.ones(5))),
+        }
+        return mean_peaks(xr.Dataset(variables))
 
     assert found([True, False])["calf"] == pytest.approx(0.1)
     assert found([True, False])["upright"] == 1

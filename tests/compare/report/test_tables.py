@@ -5,10 +5,9 @@ import pandas as pd
 import pytest
 
 from pronk_pin.compare import random_scenarios
+from pronk_pin.compare.report.overview import answer, overview
 from pronk_pin.compare.report.tables import (
-    answer,
     beside_the_paper,
-    overview,
     sampled_scenarios,
     worst_reduction,
 )
@@ -25,13 +24,13 @@ def test_our_errors_stand_beside_the_papers_at_the_same_speed(summary: pd.DataFr
 
 def test_the_overview_has_means_reductions_and_the_slowest_speed(summary: pd.DataFrame) -> None:
     table = overview(summary, scenario="nominal")
-    assert list(table.index) == ["pd", "model", "ilc"]
-    ilc = table.loc["ilc"]
-    assert ilc["calf"] == pytest.approx(0.03)
-    assert ilc["calf_reduction"] == pytest.approx(0.8)
-    assert ilc["strides"] == 8.0
-    assert ilc["speed_error"] == pytest.approx(0.05)  # magnitudes do not cancel
-    assert (ilc["upright"], ilc["robots"]) == (2, 2)
+    assert list(table) == ["pd", "model", "ilc"]
+    ilc = table["ilc"]
+    assert ilc.joints["calf"].peak.value == pytest.approx(0.03)
+    assert ilc.joints["calf"].reduction.value == pytest.approx(0.8)
+    assert ilc.settled == 8.0
+    assert ilc.speed_error == pytest.approx(0.05)  # magnitudes do not cancel
+    assert (ilc.upright, ilc.robots) == (2, 2)
 
 
 def test_the_worst_reduction_is_that_of_the_worst_speed(summary: pd.DataFrame) -> None:
@@ -46,41 +45,42 @@ def test_the_worst_reduction_is_that_of_the_worst_speed(summary: pd.DataFrame) -
 def test_one_speed_that_never_settles_is_not_hidden_by_the_others(summary: pd.DataFrame) -> None:
     settled = summary["metric"] == "strides_to_converge"
     summary.loc[summary[settled].index[0], "value"] = np.nan
-    assert np.isnan(overview(summary, scenario="nominal").loc["ilc", "strides"])
+    assert np.isnan(overview(summary, scenario="nominal")["ilc"].settled)
 
 
 def test_means_and_reductions_have_intervals_that_hold_them(summary: pd.DataFrame) -> None:
     table = overview(summary, scenario="nominal")
-    for name in ("calf", "thigh", "calf_reduction"):
-        ilc = table.loc["ilc"]
-        assert ilc[f"{name}_low"] - 1e-12 <= ilc[name] <= ilc[f"{name}_high"] + 1e-12
-    assert np.isnan(table.loc["pd", "calf_reduction"])
-    assert set(table["unit"]) == {"speed"}
+    calf, thigh = (table["ilc"].joints[joint] for joint in ("calf", "thigh"))
+    for interval in (calf.peak, thigh.peak, calf.reduction):
+        assert interval.low - 1e-12 <= interval.value <= interval.high + 1e-12
+    assert np.isnan(table["pd"].joints["calf"].reduction.value)
+    assert {row.unit for row in table.values()} == {"speed"}
 
 
 def test_who_beats_the_model_is_counted_robot_by_robot(summary: pd.DataFrame) -> None:
-    ilc = overview(summary, scenario="nominal").loc["ilc"]
-    assert (ilc["calf_model"], ilc["thigh_model"]) == (1, -1)
-    assert (ilc["calf_wins"], ilc["thigh_wins"]) == (1.0, 0.0)
-    assert ilc["calf_difference"] == pytest.approx(-0.015)
-    assert ilc["calf_wins_low"] < 0.5  # two robots prove little
-    assert (ilc["beat_strides"], ilc["beat"], ilc["learners"]) == (3.0, 1, 2)
+    ilc = overview(summary, scenario="nominal")["ilc"]
+    calf, thigh = ilc.joints["calf"], ilc.joints["thigh"]
+    assert (calf.better, thigh.better) == (True, False)
+    assert (calf.wins.value, thigh.wins.value) == (1.0, 0.0)
+    assert calf.difference.value == pytest.approx(-0.015)
+    assert calf.wins.low < 0.5  # two robots prove little
+    assert ilc.beat == (3.0, 1, 2)
 
 
 def test_robots_that_fell_are_counted_and_not_averaged(summary: pd.DataFrame) -> None:
     down = (summary["controller"] == "ilc") & (summary["speed"] == 0.35)
     summary.loc[down & (summary["metric"] == "upright"), "value"] = 0.0
-    ilc = overview(summary, scenario="nominal").loc["ilc"]
-    assert (ilc["upright"], ilc["robots"]) == (1, 2)
-    assert ilc["calf"] == pytest.approx(0.02)
+    ilc = overview(summary, scenario="nominal")["ilc"]
+    assert (ilc.upright, ilc.robots) == (1, 2)
+    assert ilc.joints["calf"].peak.value == pytest.approx(0.02)
 
 
 def test_the_answer_has_every_world_and_sampled_ones_as_one(summary: pd.DataFrame) -> None:
     sampled = [summary.assign(scenario=f"random-4-{k}") for k in range(5)]
-    table = answer(pd.concat([summary, *sampled]))
-    assert list(table.index.get_level_values("scenario").unique()) == ["nominal", "random-4"]
-    assert table.loc[("random-4", "ilc"), "robots"] == 10
-    assert table.loc[("random-4", "ilc"), "unit"] == "scenario"
+    tables = answer(pd.concat([summary, *sampled]))
+    assert list(tables) == ["nominal", "random-4"]
+    assert tables["random-4"]["ilc"].robots == 10
+    assert tables["random-4"]["ilc"].unit == "scenario"
 
 
 def test_each_sampled_world_stands_beside_what_it_is_like(summary: pd.DataFrame) -> None:

@@ -10,7 +10,8 @@ import pytest
 
 from pronk_pin._typing import Array, IntArray
 from pronk_pin.compare import Results, Schedule, Simulation, load_scenario
-from pronk_pin.compare.simulation.log import LAST, StrideLog
+from pronk_pin.compare.simulation.log import StrideLog
+from pronk_pin.compare.simulation.quantities import LAST, STRIDE_QUANTITIES
 from pronk_pin.compare.world import Motion
 from pronk_pin.compare.world.scenario import Scenario
 from pronk_pin.control import SAMPLES, ControllerSpec, Gains, load_controller
@@ -23,7 +24,7 @@ PD = load_controller("pd")
 
 def finished(log: StrideLog, name: str) -> list[Array]:
     """A quantity of the strides that each robot has finished."""
-    return [values[:n] for values, n in zip(log.scalars[name], log.count, strict=True)]
+    return [values[:n] for values, n in zip(log[name], log.count, strict=True)]
 
 
 @pytest.fixture(scope="module")
@@ -58,16 +59,18 @@ def test_the_robots_jump_about_as_high_and_run_about_as_fast_as_their_gaits(
 ) -> None:
     for robot, gait in enumerate(gaits):
         assert finished(pronking, "apex")[robot].mean() == pytest.approx(gait.apex, abs=0.03)
-        assert finished(pronking, "speed")[robot][2:].mean() == pytest.approx(gait.speed, abs=0.2)
+        assert finished(pronking, "mean_speed")[robot][2:].mean() == pytest.approx(
+            gait.speed, abs=0.2
+        )
 
 
 def test_the_same_seed_gives_the_same_strides_to_the_bit(
     simulation: Callable[..., Simulation],
 ) -> None:
     logs = [simulation(PD, seed=seed).run() for seed in (1, 1, 2)]
-    for name, values in logs[0].curves.items():
-        np.testing.assert_array_equal(values, logs[1].curves[name])
-    same, other = (np.nan_to_num(log.peak_error) for log in logs[1:])
+    for quantity in STRIDE_QUANTITIES:
+        np.testing.assert_array_equal(logs[0][quantity.name], logs[1][quantity.name])
+    same, other = (np.nan_to_num(log["peak_error"]) for log in logs[1:])
     assert np.any(same != other)
 
 
@@ -143,7 +146,7 @@ def test_a_robot_that_leaves_the_finite_numbers_is_reported_and_disturbs_nobody(
 
     assert struck.upright.tolist() == [True, False]
     assert finished(log, "upright")[1][-1] == 0.0
-    np.testing.assert_array_equal(log.peak_error[0], reference.peak_error[0])
+    np.testing.assert_array_equal(log["peak_error"][0], reference["peak_error"][0])
     assert not list(tmp_path.iterdir())  # MuJoCo would leave a log file
 
 
@@ -151,7 +154,7 @@ def test_a_robot_below_the_height_of_its_gait_has_fallen(
     simulation: Callable[..., Simulation], gaits: list[Gait]
 ) -> None:
     watched = simulation(PD)
-    watched.player._floor = np.array([0.0, gaits[1].apex])
+    watched.player.falls.floor = np.array([0.0, gaits[1].apex])
     watched.run()
     assert watched.upright.tolist() == [True, False]
 
@@ -167,7 +170,7 @@ def test_a_schedule_needs_time_for_a_stride() -> None:
     with pytest.raises(InvalidInput) as caught:
         Schedule(baseline=0.2, learning=0.1)
     assert str(caught.value) == (
-        "learning and learning of 0.2 + 0.1 s are too short for a stride; "
+        "baseline and learning of 0.2 + 0.1 s are too short for a stride; "
         "make them 1 s or more together"
     )
 
@@ -252,14 +255,15 @@ def assert_same_motion(one: StrideLog, other: StrideLog) -> None:
         assert np.isfinite(values).any()
         np.testing.assert_array_equal(np.isnan(values), np.isnan(others[name]))
     for quantity, tolerance in (("joints", 1e-6), ("base", 1e-6), ("joint_rates", 1e-4)):
-        np.testing.assert_allclose(ticks[quantity], others[quantity], atol=tolerance)
+        name = f"tick_{quantity}"
+        np.testing.assert_allclose(ticks[name], others[name], atol=tolerance)
 
 
 def test_the_ticks_kept_are_those_of_the_last_strides(pronking: StrideLog) -> None:
     ticks = pronking.ticks()
     kept = min(LAST, int(pronking.count.min()))
     for k in range(2):
-        base, rate = (ticks[name][k, -kept:] for name in ("base", "base_rate"))
+        base, rate = (ticks[name][k, -kept:] for name in ("tick_base", "tick_base_rate"))
         length = np.isfinite(base[..., 0]).sum(axis=-1)  # (strides, parts)
         total = (length.sum(axis=1) * 0.001)[-3:]
         np.testing.assert_allclose(total, finished(pronking, "duration")[k][-3:], atol=1e-9)
@@ -267,6 +271,6 @@ def test_the_ticks_kept_are_those_of_the_last_strides(pronking: StrideLog) -> No
             end = length[stride, 1] - 1  # one tick before the next touchdown
             step = base[stride, 1, end] + 0.001 * rate[stride + 1, 0, 0]
             np.testing.assert_allclose(base[stride + 1, 0, 0], step, atol=1e-6)
-        force = ticks["force"][k, -kept:]
+        force = ticks["tick_force"][k, -kept:]
         assert np.nanmax(np.abs(force[:, 1, 40:120])) == 0.0  # in the middle of flight
         assert np.all(np.nanmedian(force[:, 0, 20:100, :, 2], axis=(0, 1)) > 20.0)  # feet stand

@@ -126,12 +126,12 @@ def test_motors_that_are_fast_enough_and_perfect_sensors_change_nothing(build: B
     fast = replace(nominal, full_torque_speed=500.0, no_load_speed=1000.0)
     assert not fast.affine
     one, other = (build(scenario).run() for scenario in (nominal, fast))
-    np.testing.assert_allclose(one.peak_error, other.peak_error, atol=1e-6)
+    np.testing.assert_allclose(one["peak_error"], other["peak_error"], atol=1e-6)
 
 
 def test_a_late_torque_makes_larger_errors(build: Build) -> None:
     errors = [
-        np.nanmean(build(load_scenario(name)).run().peak_error[..., 2::3])
+        np.nanmean(build(load_scenario(name)).run()["peak_error"][..., 2::3])
         for name in ("nominal", "delay=0.006")
     ]
     assert errors[1] > 1.1 * errors[0]

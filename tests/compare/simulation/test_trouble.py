@@ -49,13 +49,13 @@ def calf_peak(simulation: Simulation, robot: int, *, last: int = 4) -> float:
     """Mean peak error of the calves over the last strides [rad]."""
     strides = simulation.strides
     end = int(strides.count[robot])
-    return float(strides.peak_error[robot, end - last : end, 2::3].mean())
+    return float(strides["peak_error"][robot, end - last : end, 2::3].mean())
 
 
 def reasons(simulation: Simulation, robot: int) -> list[str]:
     """Why strides were skipped, one by one."""
     strides = simulation.strides
-    numbers = strides.scalars["skipped"][robot, : strides.count[robot]]
+    numbers = strides["skipped"][robot, : strides.count[robot]]
     return [SKIPPED[int(number)] for number in numbers]
 
 
@@ -83,7 +83,7 @@ def test_a_push_is_forgotten(build: Build, undisturbed: Simulation) -> None:
     assert simulation.upright.all()
     limit = 2.0 * np.abs(undisturbed.controller.feedforward[0]).max()
     assert max(np.abs(feedforward).max() for feedforward in learned) < limit
-    worst = float(np.nanmax(simulation.strides.peak_error[0, 15:, 2::3]))
+    worst = float(np.nanmax(simulation.strides["peak_error"][0, 15:, 2::3]))
     assert worst > 0.02  # it was felt
     assert calf_peak(simulation, 0) < 1.5 * calf_peak(undisturbed, 0)
 
@@ -170,7 +170,7 @@ def test_a_sensor_that_fails_for_a_while_stops_learning_for_so_long(
     number = found.index("not finite")
     np.testing.assert_array_equal(learned[number + 1], learned[number])
     assert np.isfinite(simulation.controller.feedforward).all()
-    assert np.isfinite(simulation.strides.peak_error[0, : simulation.strides.count[0]]).all()
+    assert np.isfinite(simulation.strides["peak_error"][0, : simulation.strides.count[0]]).all()
     assert calf_peak(simulation, 0) < 0.03
 
 
@@ -188,6 +188,6 @@ def test_a_motor_at_its_limit_does_not_wind_up(build: Build, robot: Robot) -> No
     sizes = [np.abs(feedforward).max() for feedforward in learned]
     assert max(sizes) <= limit
     assert np.isfinite(simulation.controller.feedforward).all()
-    peaks = simulation.strides.peak_error[0, : simulation.strides.count[0]].max(axis=-1)
-    began = int(np.argmax(simulation.strides.scalars["learning"][0] == 1.0))
+    peaks = simulation.strides["peak_error"][0, : simulation.strides.count[0]].max(axis=-1)
+    began = int(np.argmax(simulation.strides["learning"][0] == 1.0))
     assert peaks[-5:].max() < peaks[began - 3 : began].min()  # and still better than without

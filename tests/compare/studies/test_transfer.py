@@ -21,7 +21,7 @@ def test_a_skill_is_reused_where_it_tracks_nearly_as_at_home() -> None:
 def excess(table: pd.DataFrame) -> pd.Series:
     """RMS over thigh and calf of the stored feedforward, over that of learning there."""
     stored, practised = (
-        (table[f"thigh{of}"] ** 2 + table[f"calf{of}"] ** 2) ** 0.5 for of in ("", "_needed")
+        (table[f"thigh{of}"] ** 2 + table[f"calf{of}"] ** 2) ** 0.5 for of in ("", "_relearned")
     )
     return stored / practised
 

@@ -44,9 +44,9 @@ def peaks(simulation: Simulation) -> tuple[Array, Array]:
     """Mean peaks of thigh and calf [rad] before learning and at the end, shape (2,) each."""
     strides, before, after = simulation.strides, [], []
     for robot, end in enumerate(strides.count):
-        first = int(np.argmax(strides.scalars["learning"][robot, :end] == 1.0))
+        first = int(np.argmax(strides["learning"][robot, :end] == 1.0))
         for found, last in ((before, first), (after, int(end))):
-            found.append(strides.peak_error[robot, last - LAST : last].mean(axis=0))
+            found.append(strides["peak_error"][robot, last - LAST : last].mean(axis=0))
     means = (np.mean(found, axis=0).reshape(4, 3).mean(axis=0)[1:] for found in (before, after))
     return tuple(means)  # type: ignore[return-value]
 
@@ -60,7 +60,7 @@ def test_the_hard_worlds_are_learned_at_one_speed(robot: Robot, scenario: str) -
 def test_with_a_delay_it_is_the_flights_timing_that_helps(robot: Robot) -> None:
     """Motors that act 4 ms late push 4 ms longer, and the flight ends later than planned."""
     practised = simulate_learning(robot, "ilc", "delay", (0.0,))
-    flight = practised.strides.scalars["duration"] - practised.strides.scalars["stance"]
+    flight = practised.strides["duration"] - practised.strides["stance"]
     planned = load_library("a1").at(0.0).flight.duration
     last = int(practised.strides.count[0]) - 1
     assert 1.05 < flight[0, last] / planned < 1.15

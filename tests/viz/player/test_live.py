@@ -288,7 +288,7 @@ def test_a_port_in_use_is_refused_with_a_remedy(scene: Scene) -> None:
 
 
 def test_a_port_that_does_not_exist_is_refused(scene: Scene) -> None:
-    with pytest.raises(InvalidInput, match="from 0 to 65535, not 70000"):
+    with pytest.raises(InvalidInput, match="port=70000; give a whole number from 0 to 65535"):
         serve(scene, port=70000, open_browser=False)
 
 

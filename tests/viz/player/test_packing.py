@@ -73,8 +73,8 @@ def test_a_film_holds_the_scene(scene: Scene) -> None:
 
 def test_a_shape_that_several_parts_share_is_there_once(scene: Scene) -> None:
     robot = unpack(robot_blob(scene))
-    assert len({part["mesh"] for part in robot["parts"]}) == len(robot["meshes"]) < 17
-    extent = np.ptp(robot["meshes"][robot["parts"][0]["mesh"]]["vertices"], axis=0)
+    assert len({part["shape"] for part in robot["parts"]}) == len(robot["shapes"]) < 17
+    extent = np.ptp(robot["shapes"][robot["parts"][0]["shape"]]["vertices"], axis=0)
     assert extent.max() < 0.5
 
 

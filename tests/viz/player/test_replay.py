@@ -100,7 +100,7 @@ def test_a_full_disk_leaves_the_replay_that_was_there(
 
 
 def test_a_film_needs_frames(scene: Scene, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="fps must be positive, not 0"):
+    with pytest.raises(InvalidInput, match="fps=0; give a number above 0, up to 1000"):
         write_replay(scene, tmp_path / "hop.html", fps=0)
 
 

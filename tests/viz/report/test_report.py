@@ -16,14 +16,15 @@ import pandas as pd
 import pytest
 
 from pronk_pin import Robot, cli
+from pronk_pin.cli.comparison import command_line
 from pronk_pin.compare import Experiment, Results, Schedule, random_scenarios, run_experiment
-from pronk_pin.compare.experiment.manifest import Manifest
 from pronk_pin.compare.experiment.suites import SUITES, load_suite
 from pronk_pin.compare.metrics.statistics import family
 from pronk_pin.compare.report.limitations import limitations
+from pronk_pin.compare.results.manifest import Manifest
 from pronk_pin.errors import FileProblem
 from pronk_pin.robot.formats.urdf import mujoco_spec
-from pronk_pin.viz.report import command, write_figures, write_report
+from pronk_pin.viz.report import write_figures, write_report
 
 EXPERIMENT = Experiment(
     speeds=(0.0, 0.4),
@@ -37,7 +38,7 @@ EXPERIMENT = Experiment(
 def result(tmp_path_factory: pytest.TempPathFactory) -> Results:
     folder = tmp_path_factory.mktemp("report") / "result"
     results = run_experiment(EXPERIMENT, folder, workers=1, progress=False)
-    write_report(results)
+    write_report(results, command=command_line(EXPERIMENT))
     return results
 
 
@@ -79,7 +80,7 @@ def test_markdown_shows_figures_that_are_there(result: Results) -> None:
 
 def test_the_same_result_gives_the_same_report(result: Results, tmp_path: Path) -> None:
     copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
-    write_report(copy)
+    write_report(copy, command=command_line(EXPERIMENT))
     for name in ("report.html", "report.md"):
         assert (copy.folder / name).read_bytes() == (result.folder / name).read_bytes()
 
@@ -98,7 +99,9 @@ def test_the_report_is_the_same_whenever_and_by_however_many_workers_it_is_made(
         path.unlink()
     program = (
         "import sys; from pronk_pin.compare import Results; "
-        "from pronk_pin.viz.report import write_report; write_report(Results.load(sys.argv[1]))"
+        "from pronk_pin.cli.comparison import command_line; "
+        "from pronk_pin.viz.report import write_report; results = Results.load(sys.argv[1]); "
+        "write_report(results, command=command_line(results.experiment))"
     )
     environment = {**os.environ, "PYTHONHASHSEED": "7", "TZ": "Pacific/Auckland"}
     subprocess.run([sys.executable, "-c", program, folder], env=environment, check=True)
@@ -126,7 +129,7 @@ def test_the_command_makes_the_same_experiment_again(
     monkeypatch.setattr(cli.Compare, "run", lambda self: found.append(self.experiment))
     others = (replace(result.experiment, base=base) for base in ("sagittal", "free"))
     for experiment in (result.experiment, *others, *map(load_suite, SUITES)):
-        words = shlex.split(command(Results(result.folder, experiment)))
+        words = shlex.split(command_line(experiment))
         assert words[0] == "pronk-pin"
         assert cli.main(words[1:]) == 0
         assert found.pop() == experiment
@@ -190,7 +193,7 @@ def test_the_report_holds_the_parity_table_of_another_robots_mjcf(
     page = (results.folder / "report.html").read_text()
     for known in ('id="parity"', "my robot.xml", f"<td>{robot.mass + 1.0:.4f}</td>", "kp 100"):
         assert known in page
-    assert f"--mjcf {shlex.quote(str(path))}" in command(results)
+    assert f"--mjcf {shlex.quote(str(path))}" in command_line(results.experiment)
 
 
 def test_a_command_of_many_lines_can_be_pasted(result: Results) -> None:
@@ -198,7 +201,9 @@ def test_a_command_of_many_lines_can_be_pasted(result: Results) -> None:
     block = re.search(r"<pre>(pronk-pin compare.*?)</pre>", text, re.DOTALL)
     assert block is not None
     assert "\n" in block[1]
-    assert shlex.split(block[1].replace("\\\n", " ")) == shlex.split(command(result))
+    assert shlex.split(block[1].replace("\\\n", " ")) == shlex.split(
+        command_line(result.experiment)
+    )
 
 
 def test_sampled_worlds_are_one_family_and_each_has_its_line(tmp_path: Path) -> None:

@@ -54,7 +54,6 @@ def report(sound: Results, tmp_path: Path) -> Iterator[Report]:
                 if cell.name.startswith(begin):
                     strides = results.strides(cell)
                     results.save(cell, befall(strides).assign_attrs(strides.attrs))
-        results.summarize()
         write_report(results)
         for name in re.findall(r"\]\((figures/[^)]+)\)", (folder / "report.md").read_text()):
             assert (folder / name).stat().st_size > 1000, name

@@ -14,7 +14,7 @@ from pronk_pin.gait import Gait, GaitPhase
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot, load_robot
 from pronk_pin.viz import Scene, Track, gait_scene
-from pronk_pin.viz.scenes.meshes import Appearance, Mesh, appearance, grid_faces, sphere, thin
+from pronk_pin.viz.scenes.meshes import Appearance, Mesh, Solid, appearance, thin
 
 
 def some_motion(robot: Robot, n: int = 40) -> np.ndarray:
@@ -155,9 +155,18 @@ def test_a_gait_runs_on_over_its_strides(robot: Robot) -> None:
     assert [mark.t for mark in track.marks[:3]] == pytest.approx([0.0, 0.2, 0.4])
 
 
+def grid(rows: int, columns: int) -> np.ndarray:
+    """Triangles between the neighbours of a rows x columns grid of vertices, shape (m, 3)."""
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1, 1)
+    triangles = np.array([[0, columns, 1], [1, columns, columns + 1]])
+    return np.concatenate([corner + triangle for triangle in triangles])
+
+
 def test_thinning_keeps_surfaces_round() -> None:
-    fine = sphere(0.1, segments=200)
-    coarse = thin(fine, cell=0.01)
+    polar, around = np.meshgrid(np.linspace(0, np.pi, 101), np.linspace(0, 2 * np.pi, 201))
+    points = np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)
+    fine = Mesh(0.1 * np.stack(points, axis=-1).reshape(-1, 3), grid(201, 101))
+    coarse = thin(fine, most=2000)
     assert len(coarse.faces) < 0.1 * len(fine.faces)
     np.testing.assert_allclose(np.linalg.norm(coarse.vertices, axis=1), 0.1, atol=1e-3)
 
@@ -166,16 +175,34 @@ def test_thinning_keeps_corners_sharp() -> None:
     # Three faces of a cube that meet in the origin, each a fine grid.
     u, v = (x.reshape(-1) for x in np.meshgrid(np.linspace(0, 0.1, 51), np.linspace(0, 0.1, 51)))
     zero = np.zeros_like(u)
-    quads = grid_faces(51, 51)
     sides = [np.stack(axes, axis=-1) for axes in ((u, v, zero), (zero, u, v), (v, zero, u))]
-    faces = np.concatenate([quads + k * len(u) for k in range(3)])
-    coarse = thin(Mesh(np.concatenate(sides), faces), cell=0.013)
+    faces = np.concatenate([grid(51, 51) + k * len(u) for k in range(3)])
+    coarse = thin(Mesh(np.concatenate(sides), faces), most=500)
+    assert len(coarse.faces) < 600
     assert np.linalg.norm(coarse.vertices, axis=1).min() < 5e-4
     assert np.abs(coarse.vertices).min(axis=1).max() < 5e-4
 
 
+def test_light_meshes_are_left_alone() -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    same = thin(Mesh(corners, faces))
+    np.testing.assert_allclose(same.vertices[same.faces], corners[faces])
+
+
+def test_the_go1_is_shown_with_its_rotors() -> None:
+    """Which are cylinders."""
+    shapes = {part.shape for part in appearance(load_robot("go1")).parts}
+    assert Solid("cylinder", (0.035, 0.02)) in shapes
+
+
 def test_the_robot_is_light_and_keeps_its_size(scene: Scene) -> None:
     parts = {part.name: part for part in scene.appearance.parts}
-    assert sum(len(part.mesh.faces) for part in parts.values()) < 40_000
-    extent = np.ptp(parts["trunk_0"].mesh.vertices, axis=0)
+    assert (
+        sum(len(part.shape.faces) for part in parts.values() if isinstance(part.shape, Mesh))
+        < 40_000
+    )
+    trunk = parts["trunk_0"].shape
+    assert isinstance(trunk, Mesh)
+    extent = np.ptp(trunk.vertices, axis=0)
     np.testing.assert_allclose(extent, [0.414, 0.194, 0.117], atol=2e-3)

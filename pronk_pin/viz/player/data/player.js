@@ -1,5 +1,5 @@
 "use strict";
-// Plays films of a robot, see documents.py for what is in them. One clock drives robots, forces,
+// Plays films of a robot, see scene_encoding.py for what is in them. One clock drives robots, forces,
 // trails and plots; nothing is drawn that the data does not hold.
 
 const {THREE} = MeshCat;
@@ -35,10 +35,18 @@ function decode(entry, data) {
 
 // --- the robot ------------------------------------------------------------------------------
 
-function meshGeometry(mesh) {
+const SOLIDS = {
+  box: (x, y, z) => new THREE.BoxGeometry(x, y, z),
+  sphere: (radius) => new THREE.SphereGeometry(radius, 16, 8),
+  cylinder: (radius, length) =>
+    new THREE.CylinderGeometry(radius, radius, length, 16).rotateX(Math.PI / 2),  // along z
+};
+
+function geometryOf(shape) {
+  if (shape.kind) return SOLIDS[shape.kind](...shape.size);
   const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute("position", new THREE.BufferAttribute(mesh.vertices.values, 3));
-  geometry.setIndex(new THREE.BufferAttribute(mesh.faces, 1));
+  geometry.setAttribute("position", new THREE.BufferAttribute(shape.vertices.values, 3));
+  geometry.setIndex(new THREE.BufferAttribute(shape.faces, 1));
   geometry.computeVertexNormals();
   return geometry;
 }
@@ -90,7 +98,7 @@ class Figure {
       // Where a ghost and the robot coincide the robot is in front, without speckles.
       polygonOffset: ghost, polygonOffsetFactor: 2, polygonOffsetUnits: 2,
     });
-    const mesh = fixed(new THREE.Mesh(this.robot.geometries[part.mesh], material), part.placement);
+    const mesh = fixed(new THREE.Mesh(this.robot.geometries[part.shape], material), part.placement);
     mesh.castShadow = !ghost;
     mesh.receiveShadow = false;
     mesh.name = part.name;
@@ -329,7 +337,7 @@ class Player {
   static async start(source) {
     const player = new Player(source);
     const robot = await unpack(source.robot);
-    robot.geometries = robot.meshes.map(meshGeometry);
+    robot.geometries = robot.shapes.map(geometryOf);
     player.robot = robot;
     robot.jointNames.forEach((name, i) => $("joint").add(new Option(name, i)));
     $("joint").value = robot.shown;
@@ -546,7 +554,7 @@ class Player {
     this.plots.forEach((plot) => plot.mark(this.time));
   }
 
-  // An instant that the stream sends: 32-bit floats, see documents.row_bytes.
+  // An instant that the stream sends: 32-bit floats, see scene_encoding.row_bytes.
   stream(buffer) {
     const values = new Float32Array(buffer);
     let at = 0;

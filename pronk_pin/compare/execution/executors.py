@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 from ..._checks import shown
 from ..._workers import begin_worker
-from ..._workers import count_steps as count_steps  # for those who are handed a crew
 from ...errors import ExecutorUnavailable, InvalidInput
 from ...storage import temporary_folder
 

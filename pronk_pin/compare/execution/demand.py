@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from ...errors import InvalidInput
-from ...gait import load_library
+from ..experiment import Experiment
 from ..simulation import SHORTER, check_memory, number_of_robots
-from .experiment import Experiment
 
 LONGEST = 30.0
 """Days that an experiment may take, by a hopeful estimate."""
@@ -29,10 +26,8 @@ def check_demand(experiment: Experiment, workers: int) -> None:
     Raises:
         InvalidInput: It does not, or does.
     """
-    base: Literal["sagittal"] | None = None if experiment.base == "locked" else "sagittal"
-    library = load_library(experiment.robot, base=base)
-    gaits = [library.at(speed) for speed in experiment.speeds]
-    duration, cells = experiment.schedule.duration, len(experiment.cells())
+    gaits, cells = experiment.gaits, len(experiment.cells())
+    duration = experiment.schedule.duration
     check_memory(gaits, duration, at_once=min(workers, cells))
     days = duration * len(gaits) * cells / _QUICK / workers / _DAY
     if days > LONGEST:

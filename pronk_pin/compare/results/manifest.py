@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from ...storage import as_type, damaged, read_bytes, read_sealed, sealed, sha256, write_file
+from .remedies import complete, no_room
 
 MANIFEST = "manifest.json"
 """Its name."""
@@ -90,13 +91,3 @@ class Manifest:
 
 def _sorted(document: _Document) -> dict[str, dict[str, str]]:
     return {key: dict(sorted(part.items())) for key, part in asdict(document).items()}
-
-
-def complete(folder: Path) -> str:
-    """The remedy where a results folder lacks something."""
-    return f"run 'pronk-pin compare --folder {folder}' to make it"
-
-
-def no_room(folder: Path) -> str:
-    """The remedy where nothing can be written into a results folder."""
-    return f"make room, and run the same command again with --folder {folder}"

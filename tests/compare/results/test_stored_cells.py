@@ -20,10 +20,10 @@ from pronk_pin.compare.experiment.definition import (
     describe,
     differences,
 )
-from pronk_pin.compare.experiment.strides_file import encode
+from pronk_pin.compare.results.strides_file import encode
 from pronk_pin.control import CONTROLLERS, ControllerSpec, PDTypeILC
 from pronk_pin.errors import FileProblem, InvalidInput, OtherMachine
-from tests.compare.experiment.conftest import modified
+from tests.compare.conftest import modified
 
 
 def refused(call: Callable[[], object]) -> str:
@@ -72,7 +72,7 @@ def renamed(results: Results, source: Path, controller: str) -> None:
 
 def test_strides_under_another_controllers_name_are_refused(copy: Results) -> None:
     renamed(copy, copy.path(copy.find(controller="pd")), "ilc")
-    for call in (lambda: run(copy.experiment, copy), copy.summarize):
+    for call in (lambda: run(copy.experiment, copy), copy.summary):
         text = refused(call)
         assert "ilc_nominal_0.nc: is of another simulation" in text
         assert "controller.name pd there, ilc here" in text
@@ -281,7 +281,7 @@ def test_a_command_that_fails_leaves_no_folder_behind(
     def fail(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("pronk_pin.compare.experiment.run.run_cell", fail)
+    monkeypatch.setattr("pronk_pin.compare.execution.run.run_cell", fail)
     assert main(["compare", "--speeds", "0.3", "--controllers", "pd", "--workers", "1"]) == 130
     assert main(["compare", "--mjcf", "missing.xml"]) == 1
     assert not list(tmp_path.iterdir())

@@ -15,7 +15,7 @@ from pronk_pin.errors import (
     SpeedOutOfRange,
     UnknownName,
 )
-from tests.compare.experiment.conftest import modified
+from tests.compare.conftest import modified
 
 
 def test_a_run_leaves_strides_summary_and_config_and_nothing_else(comparison: Results) -> None:
@@ -104,5 +104,5 @@ def test_the_bar_counts_every_step_of_every_robot(
 
 
 def test_without_a_worker_nothing_can_run(copy: Results) -> None:
-    with pytest.raises(InvalidInput, match="0 workers; at least one is needed"):
+    with pytest.raises(InvalidInput, match="workers=0; give a whole number from 1 to 1024"):
         run_experiment(copy.experiment, copy.folder, workers=0)

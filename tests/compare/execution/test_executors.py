@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
-from pronk_pin.compare.experiment.executors import connect
+from pronk_pin.compare.execution.executors import connect
 from pronk_pin.errors import ExecutorUnavailable, FileProblem, InvalidInput, WorkerLost
 
 EXPERIMENT = Experiment(
@@ -32,7 +32,7 @@ EXPERIMENT = Experiment(
 COMMAND = """
 import sys
 from pathlib import Path
-from tests.compare.experiment.test_executors import EXPERIMENT
+from tests.compare.execution.test_executors import EXPERIMENT
 from pronk_pin.compare import run_experiment
 if __name__ == "__main__":
     run_experiment(EXPERIMENT, Path(sys.argv[1]), workers=int(sys.argv[2]), progress=False)
@@ -246,7 +246,7 @@ def test_what_is_no_address_of_a_scheduler_is_refused(address: str) -> None:
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("pronk_pin.compare.experiment.executors._TIMEOUT", 0.5)
+    monkeypatch.setattr("pronk_pin.compare.execution.executors._TIMEOUT", 0.5)
     with (
         pytest.raises(
             ExecutorUnavailable,

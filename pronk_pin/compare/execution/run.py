@@ -9,10 +9,11 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,13 +25,20 @@ from ..._checks import instance_of, path, worker_count
 from ..._workers import count_steps
 from ...control import load_controller
 from ...errors import FileProblem, WorkerLost
+from ..experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
+from ..metrics import CellSummary, join_summaries, summarize_cell
+from ..results import (
+    Results,
+    check_completion,
+    describe_run,
+    encode,
+    locked,
+    make_folder,
+    remove_if_empty,
+)
 from ..simulation import Progress
 from .demand import check_demand
 from .executors import WorkerPool, connect, known_address, processes
-from .experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
-from .provenance import describe_run
-from .results import Results
-from .strides_file import encode
 
 MAX_RETRIES = 3
 """So often the workers may be lost before the run gives up."""
@@ -72,7 +80,8 @@ def run_experiment(
         FileProblem: The folder cannot be written, holds another experiment or strides of one, was
             begun with other versions or another MJCF, or another run is writing there; or the MJCF
             cannot be read.
-        InvalidInput: The MJCF is not of this robot, or no worker is allowed.
+        InvalidInput: The MJCF is not of this robot, no worker is allowed, or the experiment is too
+            large: see `check_demand`.
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
     """
@@ -85,13 +94,14 @@ def run_experiment(
     else:
         instance_of("executor", executor, Executor, "an Executor, or an address dask://HOST:PORT")
     fresh = not folder.exists()
-    results = Results.create(experiment, folder, resimulate=resimulate)
+    results = Results.of(experiment, folder)
+    make_folder(results, resimulate=resimulate)
     try:
-        with results.locked():
+        with locked(results.folder):
             _complete(results, workers, executor, progress=progress, resimulate=resimulate)
     except BaseException:
         if fresh:
-            results.remove_if_empty()
+            remove_if_empty(results.folder)
         raise
     return results
 
@@ -107,10 +117,9 @@ def _complete(
     """Simulate what is missing, and summarize."""
     cells = _missing(results, resimulate=resimulate)
     if not cells and results.provenance["finished"]:
-        results.summarize()
+        _summarize(results, {})
         return  # who made the strides stays on record
-    results.check_versions()
-    results.check_foreign()
+    check_completion(results)
     with tqdm(
         total=sum(map(_robot_steps, cells)),
         desc=f"simulating {len(results.experiment.speeds)} robots x {len(cells)}",
@@ -125,8 +134,18 @@ def _complete(
         else:
             run.elsewhere(cells, _worker_pool(executor, min(workers, len(cells))))
     began = time.monotonic()
-    results.summarize()
+    _summarize(results, run.summaries)
     run.finish(summary=time.monotonic() - began)
+
+
+def _summarize(results: Results, made: Mapping[Cell, CellSummary]) -> None:
+    """Write the summary; the strides of cells that this run has not made are read for it."""
+    results.write_summary(
+        join_summaries(
+            made[cell] if cell in made else summarize_cell(results.strides(cell))
+            for cell in results.experiment.cells()
+        )
+    )
 
 
 def _missing(results: Results, *, resimulate: bool) -> list[Cell]:
@@ -163,10 +182,14 @@ class FinishedCell(NamedTuple):
 
     strides: bytes
     """Its file."""
+    summary: CellSummary
+    """What it gives to the summary."""
     simulation: float
     """How long the simulation took [s]."""
     encoding: float
     """How long it took to make the file of it [s]."""
+    summarizing: float
+    """How long its summary took [s]."""
 
 
 @dataclass
@@ -177,6 +200,8 @@ class _Run:
     bar: tqdm[Any]
     missing: set[Cell]
     began: float = field(default_factory=time.monotonic)
+    summaries: dict[Cell, CellSummary] = field(default_factory=dict)
+    """Of the cells that are finished."""
 
     def __post_init__(self) -> None:
         self._record = {**describe_run(), "executor": "one process", "cells": {}}
@@ -248,15 +273,17 @@ class _Run:
 
     def _save(self, cell: Cell, finished: FinishedCell) -> None:
         self.results.save(cell, finished.strides)
+        self.summaries[cell] = finished.summary
         self.missing.discard(cell)
         self._record["cells"][cell.name] = {
             "simulation_s": round(finished.simulation, 2),
             "encoding_s": round(finished.encoding, 2),
+            "summary_s": round(finished.summarizing, 2),
         }
         self._write()
 
     def finish(self, *, summary: float) -> None:
-        """The run is complete; its summary took so long [s]."""
+        """The run is complete; to join its summary took so long [s]."""
         self._record["wall_time_s"] = round(time.monotonic() - self.began, 1)
         self._record["summary_s"] = round(summary, 2)
         self._write(finished=True)
@@ -278,7 +305,10 @@ def _make(cell: Cell, dependency: xr.Dataset | None, progress: Progress) -> Fini
         times.append(time.perf_counter())
         data = encode(strides)
         times.append(time.perf_counter())
-    return FinishedCell(data, times[1] - times[0], times[2] - times[1])
+        summary = summarize_cell(strides)
+        times.append(time.perf_counter())
+    simulation, encoding, summarizing = (after - before for before, after in pairwise(times))
+    return FinishedCell(data, summary, simulation, encoding, summarizing)
 
 
 def _work(cell: Cell, dependency: xr.Dataset | None) -> FinishedCell:

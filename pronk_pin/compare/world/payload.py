@@ -1,4 +1,4 @@
-"""Mismatches of the trunk's mass: a payload, and a shifted centre of mass."""
+"""The payload on the trunk, at its place, and the trunk's shifted centre of mass."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...robot.formats import body_inertia, set_body_inertia
 from .scenario import Scenario
 
 
-def load_trunk(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
+def apply_payload(trunk: mujoco.MjsBody, scenario: Scenario) -> None:
     """Shift the trunk's centre of mass, and merge the payload into its inertia.
 
     A body of its own for the payload would be fused wrongly (MuJoCo 4.0.0 doubles its offset).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,8 +12,10 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from ...errors import cannot_write
+from ...errors import FileProblem, cannot_write
 from ...storage import reading
+from ..experiment import Definition, differences, fingerprint
+from .remedies import SIMULATE_AGAIN
 
 _LARGEST = 2**33
 """Size beyond which strides are not unpacked [bytes]."""
@@ -37,6 +40,34 @@ def decode(data: bytes, path: Path, remedy: str) -> xr.Dataset:
         if file.nbytes > _LARGEST:
             raise ValueError(f"it says that it has {file.nbytes / 1e9:.0f} GB")
     return file
+
+
+def check_fingerprint(file: xr.Dataset, path: Path, wanted: Definition) -> None:
+    """Refuse strides that are not of the simulation that is asked for.
+
+    Args:
+        file: The strides.
+        path: Where they come from, for the error.
+        wanted: Definition of the simulation.
+
+    Raises:
+        FileProblem: They are of another one; it says in what it differs.
+    """
+    if file.attrs.get("fingerprint") != fingerprint(wanted):
+        raise FileProblem(
+            path, f"is of another simulation ({_mismatch(file, wanted)})", SIMULATE_AGAIN
+        )
+
+
+def _mismatch(file: xr.Dataset, wanted: Definition) -> str:
+    """What a file of strides is of, as far as that is not what is wanted."""
+    text = file.attrs.get("definition")
+    if not isinstance(text, str):
+        return "it does not say of which"
+    try:
+        return differences(json.loads(text), wanted) or "its fingerprint is not its own"
+    except ValueError:
+        return "it does not say of which"
 
 
 def join_speeds(parts: Sequence[xr.Dataset]) -> xr.Dataset:

@@ -11,14 +11,41 @@ import os
 import platform
 import shutil
 import subprocess
+from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_info
 
+from ...storage import as_type, read_sealed
+
+PROVENANCE = "provenance.json"
+"""Its name."""
+
 _PACKAGES = ("pronk-pin", "pin", "example-robot-data", "mujoco", "proxsuite", "numpy", "scipy")
 _TIMEOUT = 10.0  # [s], for git
+
+
+@dataclass(frozen=True)
+class _Document:
+    """What the file holds."""
+
+    finished: bool
+    runs: list[dict[str, Any]]
+
+
+def read_provenance(folder: Path) -> dict[str, Any]:
+    """Read it: whether the run is `finished`, and its `runs`, first to last.
+
+    Raises:
+        FileProblem: It is damaged.
+    """
+    path = folder / PROVENANCE
+    if not path.is_file():
+        return {"finished": False, "runs": []}
+    remedy = "delete it: only the record of who made it is lost"
+    return asdict(as_type(read_sealed(path, remedy), _Document, path, remedy))
 
 
 def versions() -> dict[str, str]:

@@ -1,0 +1,73 @@
+"""Torques that a controller begins with: none, the model's, or what another cell has learned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from ...control import (
+    ControllerSpec,
+    InitialFeedforward,
+    TorqueLibrary,
+    model_feedforward,
+    phase_grid,
+)
+from ...errors import InvalidInput
+from ...gait import Gait
+from ...robot import Robot
+from ..metrics import steady
+
+LIBRARY_VARIABLES = ("count", "learning", "feedforward", "flight_reference")
+"""What of a learned cell's strides the torque library is made of."""
+
+
+def torque_library(strides: xr.Dataset) -> TorqueLibrary:
+    """The torque library learned in a simulation: means over its steady strides (section III.B)."""
+    end = steady(strides)
+    torque = end["feedforward"].interp(phase=phase_grid(), method="cubic")
+    torque = torque.transpose("speed", "stride", "part", "phase", "joint")
+    flight = end["flight_reference"].transpose("speed", "stride")
+    return TorqueLibrary.from_strides(
+        strides["speed"].to_numpy(), torque.to_numpy(), flight.to_numpy()
+    )
+
+
+def initial_feedforward(
+    spec: ControllerSpec,
+    gaits: Sequence[Gait],
+    *,
+    model: Robot,
+    learned: xr.Dataset | None = None,
+    base: str = "locked",
+) -> InitialFeedforward:
+    """Torques that a controller begins with, by the source that its specification names.
+
+    Args:
+        spec: The controller.
+        gaits: The gaits to be played, one for each robot.
+        model: The robot as the model knows it: the identified one where that is the source.
+        learned: Strides of the learning that a torque library is made of.
+        base: How the trunk may move.
+
+    Raises:
+        InvalidInput: The torques are to be learned ones, and there are no strides.
+    """
+    if spec.source in ("model", "identified"):
+        return InitialFeedforward(model_feedforward(model, gaits, base=base))
+    if spec.source == "library":
+        library = torque_library(learned_strides(spec, learned))
+        return library.initial_feedforward(np.array([gait.speed for gait in gaits]))
+    return InitialFeedforward()
+
+
+def learned_strides(spec: ControllerSpec, strides: xr.Dataset | None) -> xr.Dataset:
+    """The strides that a controller's source of feedforward is learned from.
+
+    Raises:
+        InvalidInput: There are none.
+    """
+    if strides is None:
+        raise InvalidInput(f"controller '{spec.name}' begins with what 'ilc' has learned; run it")
+    return strides

@@ -1,0 +1,190 @@
+"""What each controller reaches in a scenario, and how sure that is, computed from the summary."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import pandas as pd
+
+from ..._typing import Array
+from ..metrics import (
+    NO_INTERVAL,
+    RIVAL,
+    Interval,
+    beaten,
+    compare_controllers,
+    family,
+    in_family,
+    lessons,
+    mean_interval,
+    robots,
+    unit_of,
+)
+from .tables import SHOWN
+
+_MOVING = 0.05
+"""Speed from which on a robot goes somewhere, so that its transport has a cost [m/s]."""
+
+
+@dataclass(frozen=True)
+class JointOverview:
+    """Errors of one joint under a controller, means over the robots that did not fall.
+
+    Attributes:
+        peak: Mean peak error [rad].
+        rms: Mean root mean square error [rad].
+        reduction: Of the mean peak against PD's; NaN where that was not run.
+        difference: Of the mean peak from the model's, pair by pair [rad]; likewise.
+        wins: Share of the robots that have a smaller error than with the model; likewise.
+        better: Whether it is better than with the model beyond doubt, or worse; None where the
+            interval of the difference holds 0.
+        pairs: Robots that stayed up under both.
+    """
+
+    peak: Interval
+    rms: float
+    reduction: Interval = NO_INTERVAL
+    difference: Interval = NO_INTERVAL
+    wins: Interval = NO_INTERVAL
+    better: bool | None = None
+    pairs: int = 0
+
+
+class Beat(NamedTuple):
+    """When learning came to beat the model in calf and thigh, for good."""
+
+    strides: float
+    """Strides of learning, the median over the robots that did; NaN without one."""
+    robots: int
+    """Robots that did."""
+    learners: int
+    """Robots that learned."""
+
+
+@dataclass(frozen=True)
+class ControllerOverview:
+    """What a controller reaches in a scenario, over all speeds and seeds.
+
+    Attributes:
+        joints: Errors of `SHOWN`.
+        settled: Strides to converge, the slowest robot; NaN if one does not, or falls.
+        taught: Strides that something was learned from; None without learning.
+        beat: When it came to beat the model.
+        feedback: The feedback's share of the torque.
+        cost: Mean cost of transport of the robots that move.
+        speed_error: Mean magnitude [m/s].
+        apex_error: Mean magnitude [m].
+        upright: Robots that stayed up.
+        fell: Robots that did not.
+        robots: How many there were, with those that finished no stride, of which neither is known.
+        unit: What the intervals are drawn over, see `compare.metrics.statistics`.
+    """
+
+    joints: Mapping[str, JointOverview]
+    settled: float
+    taught: int | None
+    beat: Beat
+    feedback: float
+    cost: float
+    speed_error: float
+    apex_error: float
+    upright: int
+    fell: int
+    robots: int
+    unit: str
+
+
+Overview: TypeAlias = dict[str, ControllerOverview]
+"""What each controller reaches in one scenario, the largest error of the calf first."""
+
+
+def overview(summary: pd.DataFrame, *, scenario: str) -> Overview:
+    """What each controller reaches in a scenario, in the order of the calf's error.
+
+    Args:
+        summary: See `compare.metrics`.
+        scenario: A scenario, or a family of sampled ones.
+    """
+    rows = in_family(summary, scenario)
+    names = [str(name) for name in rows["controller"].unique()]
+    found = {name: _reached(rows, scenario, name, rivals=set(names) - {name}) for name in names}
+
+    def place(name: str) -> tuple[bool, float]:
+        error = found[name].joints["calf"].peak.value
+        return bool(np.isnan(error)), -error
+
+    return {name: found[name] for name in sorted(names, key=place)}
+
+
+def answer(summary: pd.DataFrame) -> dict[str, Overview]:
+    """The overviews of all scenarios, sampled ones by family, in the summary's order."""
+    families = dict.fromkeys(map(family, summary["scenario"].unique()))
+    return {name: overview(summary, scenario=name) for name in families}
+
+
+def _reached(
+    summary: pd.DataFrame, scenario: str, controller: str, *, rivals: set[str]
+) -> ControllerOverview:
+    own = summary[summary["controller"] == controller]
+
+    def table(metric: str, joint: str = "-") -> pd.DataFrame:
+        return robots(own, scenario=scenario, controller=controller, metric=metric, joint=joint)
+
+    def values(metric: str) -> Array:
+        return np.asarray(table(metric).to_numpy(dtype=float)).ravel()
+
+    settled, cost = values("strides_to_converge"), table("cost_of_transport")
+    moving = np.abs(cost.columns.to_numpy(float)) > _MOVING
+    learned = lessons(summary, controller=controller)
+    upright = own[own["metric"] == "upright"]["value"]
+    return ControllerOverview(
+        joints={joint: _joint(summary, scenario, controller, joint, rivals) for joint in SHOWN},
+        settled=float(settled.max()) if settled.size else np.nan,
+        taught=None if learned is None else learned.taught,
+        beat=Beat(*beaten(summary, controller=controller)),
+        feedback=_mean(values("feedback_share")),
+        cost=_mean(cost.loc[:, moving].to_numpy(float)),
+        speed_error=_mean(np.abs(values("speed_error"))),
+        apex_error=_mean(np.abs(values("apex_error"))),
+        upright=int((upright == 1.0).sum()),
+        fell=int((upright == 0.0).sum()),
+        robots=len(upright),
+        unit=unit_of(table("upright")),
+    )
+
+
+def _joint(
+    summary: pd.DataFrame, scenario: str, controller: str, joint: str, rivals: set[str]
+) -> JointOverview:
+    errors, rms = (
+        robots(summary, scenario=scenario, controller=controller, metric=metric, joint=joint)
+        for metric in ("peak_error", "rms_error")
+    )
+    peak, rms_mean = mean_interval(errors), _mean(np.asarray(rms.to_numpy(dtype=float)).ravel())
+    reduction = NO_INTERVAL
+    if "pd" in rivals:
+        reduction = compare_controllers(
+            summary, scenario=scenario, controller=controller, against="pd", joint=joint
+        ).reduction
+    if RIVAL not in rivals:
+        return JointOverview(peak, rms_mean, reduction)
+    beside = compare_controllers(
+        summary, scenario=scenario, controller=controller, against=RIVAL, joint=joint
+    )
+    return JointOverview(
+        peak,
+        rms_mean,
+        reduction,
+        difference=beside.difference,
+        wins=beside.improvement,
+        better=beside.better,
+        pairs=beside.pairs,
+    )
+
+
+def _mean(values: Array) -> float:
+    """Mean of what there is; NaN without anything."""
+    return float(np.nanmean(values)) if np.isfinite(values).any() else float("nan")
