@@ -58,7 +58,7 @@ class ZeroPhaseFilter:
                 f"{change} {abs(1.0 - self.dc_gain):.0%} of a constant torque in each stride; use "
                 "coefficients that are not rounded, as ZeroPhaseFilter.butterworth gives them",
                 LeakyFilter,
-                stacklevel=3,
+                stacklevel=5,  # who makes a controller: beyond `bind`, `bound` and `Controller`
             )
 
     @classmethod
