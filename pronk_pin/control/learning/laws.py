@@ -234,7 +234,8 @@ class PDTypeILC(FilteredLaw):
     Attributes:
         gain: Learning gain; 0 to 1.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase; what the feedforward does takes a while to show in the error.
+        delta: Look-ahead, as a part of the phase s from 0 to 1: how much later the error is read,
+            since what a feedforward does takes a while to show in it.
         gains: Weights of the error and its rate: eq. (10).
         filter: The learning filter Q.
     """
@@ -265,7 +266,7 @@ class PaperILC(FilteredLaw):
     is 2; only the filter's leak keeps the law from diverging.
 
     Attributes:
-        delta: Look-ahead in phase.
+        delta: Look-ahead, as a part of the phase s from 0 to 1, into the error.
         gains: Feedforward gains, in the paper equal to the feedback gains.
         filter: Zero-phase filter over recorded torques and errors.
     """
@@ -297,7 +298,7 @@ class CurrentIterationILC(FilteredLaw):
     Attributes:
         gain: Part of the feedback torque that is taken over; 1 in the textbook.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase.
+        delta: Look-ahead, as a part of the phase s from 0 to 1, into the feedback.
         filter: The learning filter Q.
     """
 

@@ -101,7 +101,7 @@ def first_order(values: Array, start: Array, *, time_constant: float, timestep: 
 
 
 def look_ahead(values: Array, delta: float, onward: Array | None = None) -> Array:
-    """Read values (n, samples, ...) on the phase grid at s + delta.
+    """Read values (n, samples, ...) on the phase grid at s + delta, the look-ahead from 0 to 1.
 
     Beyond the end `onward` (n, m, ...) goes on on the same spacing; then the last one is held.
     """
