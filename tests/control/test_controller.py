@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,9 @@ from pronk_pin.control import (
     Controller,
     ControllerSpec,
     Gains,
+    LawContext,
+    NormOptimalILC,
+    PaperILC,
     PDTypeILC,
     PhaseLog,
     StrideRecord,
@@ -22,7 +25,7 @@ from pronk_pin.control import (
     load_controller,
     phase_grid,
 )
-from pronk_pin.errors import InvalidInput, UnknownName
+from pronk_pin.errors import InvalidInput, LeakyFilter, UnknownName
 from pronk_pin.gait import Gait
 from pronk_pin.kinematics import leg_angle
 from pronk_pin.robot import Robot
@@ -327,6 +330,73 @@ def test_standing_holds_the_posture_in_which_stance_begins(
     np.testing.assert_allclose(tape.position[:, 0], start)
     assert not tape.velocity.any()
     assert not tape.feedforward.any()
+
+
+@dataclass(frozen=True)
+class Noting:
+    """A law that notes where it is going to learn, and answers something to `bind`."""
+
+    answer: object = field(default_factory=PDTypeILC)
+    contexts: list[LawContext] = field(default_factory=list)
+
+    def bind(self, context: LawContext) -> object:
+        self.contexts.append(context)
+        return self.answer
+
+    def update(self, record: StrideRecord) -> Array:
+        raise AssertionError("the law that it answered was to learn")
+
+
+def test_each_law_is_bound_once_to_its_part_of_the_stride(
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    learn: Callable[..., Tape],
+) -> None:
+    stance, flight = Noting(), Noting()
+    spec = ControllerSpec("mine", law=stance, flight_law=flight)
+    learn(Controller(robot, gaits, spec, timestep=DT), stances(0.1))
+    (of_stance,), (of_flight,) = stance.contexts, flight.contexts
+    assert (of_stance.part, of_flight.part) == ("stance", "flight")
+    assert of_stance.robot is robot
+    assert of_stance.gaits == tuple(gaits)
+    assert (of_stance.controller, of_stance.base) == ("mine", "locked")
+    assert (of_stance.gains, of_stance.timestep) == (Gains(), DT)
+
+
+def test_a_bind_that_answers_no_law_is_refused(robot: Robot, gaits: list[Gait]) -> None:
+    spec = ControllerSpec("mine", law=Noting(answer=None))
+    with pytest.raises(
+        InvalidInput, match=r"Noting of controller 'mine' returned nothing from bind"
+    ):
+        Controller(robot, gaits, spec, timestep=DT)
+
+
+def test_a_law_with_a_model_of_the_stance_on_a_locked_base_is_refused_elsewhere(
+    robot: Robot, gaits: list[Gait]
+) -> None:
+    in_flight = ControllerSpec("mine", flight_law=NormOptimalILC())
+    with pytest.raises(InvalidInput, match="a model of the stance as that of the flight"):
+        Controller(robot, gaits, in_flight, timestep=DT)
+    spec = load_controller("ilc-norm-optimal")
+    with pytest.raises(InvalidInput, match=r"counts on a level trunk; .* or base 'locked'"):
+        Controller(robot, gaits, spec, timestep=DT, base="sagittal")
+
+
+def test_a_law_whose_filter_leaks_warns_where_its_controller_is_made(
+    robot: Robot, gaits: list[Gait]
+) -> None:
+    with pytest.warns(LeakyFilter) as caught:
+        Controller(robot, gaits, ControllerSpec("mine", law=PaperILC()), timestep=DT)
+    assert [warning.filename for warning in caught] == [__file__]
+
+
+def test_only_a_trunk_that_may_turn_is_balanced(robot: Robot, gaits: list[Gait]) -> None:
+    made = {
+        base: Controller(robot, gaits, load_controller("ilc"), timestep=DT, base=base)
+        for base in ("locked", "sagittal", "free")
+    }
+    assert {base for base, controller in made.items() if controller.balance is None} == {"locked"}
 
 
 def test_a_feedforward_of_the_wrong_shape_is_refused(robot: Robot, gaits: list[Gait]) -> None:
