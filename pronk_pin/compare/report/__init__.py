@@ -7,7 +7,13 @@ Goes out: tables and text for a terminal and for the report.
 from .difference import format_changes
 from .limitations import limitations
 from .overview import ControllerOverview, JointOverview, Overview, answer, overview
-from .tables import SHOWN, SHOWN_PARAMETERS, beside_the_paper, sampled_scenarios
+from .tables import (
+    SHOWN,
+    SHOWN_PARAMETERS,
+    beside_the_paper,
+    paper_learner,
+    sampled_scenarios,
+)
 from .verdict import (
     against_model,
     answer_in_words,
@@ -44,6 +50,7 @@ __all__ = [
     "limitations",
     "number",
     "overview",
+    "paper_learner",
     "sampled_scenarios",
     "units_of_intervals",
     "verdict",

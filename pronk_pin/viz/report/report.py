@@ -35,6 +35,7 @@ from ...compare.report import (
     beside_the_paper,
     families,
     limitations,
+    paper_learner,
     sampled_scenarios,
     units_of_intervals,
     verdict,
@@ -272,8 +273,9 @@ def _beside(document: Document, beside: pd.DataFrame, table: Overview) -> None:
         return
     document.table(report_tables.table_1(beside))
     document.text(
-        "The last row holds the means of the peaks, and the reduction of the mean (the paper "
-        "prints the mean of its reductions: 75.8 % and 30.8 %).",
+        f"ILC of this run: `{paper_learner(table)}`. The last row holds the means of the peaks, and "
+        "the reduction of the mean (the paper prints the mean of its reductions: 75.8 % and "
+        "30.8 %).",
         "note",
     )
 
