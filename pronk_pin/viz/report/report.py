@@ -273,7 +273,7 @@ def _beside(document: Document, beside: pd.DataFrame, table: Overview) -> None:
         return
     document.table(report_tables.table_1(beside))
     document.text(
-        f"ILC of this run: `{paper_learner(table)}`. The last row holds the means of the peaks, and "
+        f"ILC of this run: `{paper_learner(table)}`. The last row holds means of the peaks, and "
         "the reduction of the mean (the paper prints the mean of its reductions: 75.8 % and "
         "30.8 %).",
         "note",
