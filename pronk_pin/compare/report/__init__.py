@@ -4,6 +4,7 @@ Comes in: a summary, or `Results`.
 Goes out: tables and text for a terminal and for the report.
 """
 
+from .cells import against_model, beat_text, between, number, units_of_intervals
 from .difference import format_changes
 from .limitations import limitations
 from .overview import ControllerOverview, JointOverview, Overview, answer, overview
@@ -14,20 +15,8 @@ from .tables import (
     paper_learner,
     sampled_scenarios,
 )
-from .verdict import (
-    against_model,
-    answer_in_words,
-    beat_text,
-    beside_note,
-    between,
-    families,
-    format_suite,
-    format_summary,
-    format_tables,
-    number,
-    units_of_intervals,
-    verdict,
-)
+from .terminal import beside_note, format_suite, format_summary, format_tables
+from .verdict import answer_in_words, families, verdict
 
 __all__ = [
     "SHOWN",
