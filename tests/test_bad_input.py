@@ -675,7 +675,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["compare", "--controllers", "pd/ilc"], "unknown controller 'pd/ilc'; choose one of: pd, ilc"),
     (["compare", "--controllers", "pd", "pd"], "controllers must name at least one, and none of"),
     (["compare", "--robot", ""], "unknown robot ''; choose one of: a1, go1, go2, solo12"),
-    (["compare", "--suite", "all"], "unknown suite 'all'; choose one of: default, mismatch"),
+    (["compare", "--suite", "all"], "unknown suite 'all'; choose one of: default, knowledge"),
     (["compare", "--base", "None"], "unknown base 'None'; choose one of: locked, sagittal, free"),
     ([*SHORT, "--workers", "0"], "workers=0; give a whole number from 1 to 1024"),
     ([*SHORT, "--workers", "-3"], "workers=-3; give a whole number from 1 to 1024"),

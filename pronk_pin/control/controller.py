@@ -7,6 +7,7 @@ the tapes; the controller is called at each touchdown, lift-off and landing of a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -118,7 +119,8 @@ class Controller:
         if flight is not None:
             self._flight.stretch(np.arange(n), as_array("flight", flight, n, ()))
         context = self._context()
-        self._laws = [bound(law, context) for law in spec.laws]
+        of_flight = replace(context, part="flight")
+        self._laws = [bound(spec.law, context), bound(spec.flight_law, of_flight)]
         self.balance = spec.balance.bind(context)
         self.guard = None
         if spec.guard is not None:
@@ -130,7 +132,7 @@ class Controller:
         )
 
     def _context(self) -> LawContext:
-        """What laws and balance are bound to."""
+        """What balance and the law of the stance are bound to."""
         spec, timestep = self.spec, self._timestep
         settings = StrideSettings(
             spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
@@ -143,6 +145,7 @@ class Controller:
             base=self._base,
             timestep=timestep,
             ticks=self.max_ticks,
+            part="stance",
             lifted_model=lambda gait: lifted_model(self.robot, gait, settings),
         )
 

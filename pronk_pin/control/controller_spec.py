@@ -13,8 +13,11 @@ from .._checks import (
     keep_instances,
     keep_reals,
     known_name,
+    sequence_of,
+    text,
     whole,
 )
+from ..errors import InvalidInput
 from .feedback import SPEED_FILTER, AttitudeFilter, BalanceSpec, LegAngleRegulator
 from .learning import (
     FLIGHT_LAW,
@@ -33,6 +36,14 @@ SOURCES = ("none", "model", "library", "identified")
 """Sources of a controller's initial feedforward."""
 
 
+GAIT_MODELS = ("urdf", "datasheet", "identified")
+"""Models that a controller's gaits may be optimised with."""
+
+KNOWLEDGE = ("urdf", "rotors", "friction", "load", "trunk state", "foot forces")
+"""What a controller may know of robot and world: masses and lengths, rotors' inertia, the joints'
+friction, what the trunk carries; and what it may measure beyond joints and touchdown."""
+
+
 @dataclass(frozen=True)
 class ControllerSpec:
     """Specification of a controller: initial feedforward, learning laws, feedback, regulation.
@@ -41,7 +52,11 @@ class ControllerSpec:
         name: Short name, as on the command line.
         source: Source of its initial feedforward: "none", "model", "library", or "identified", the
             model with the parameters identified from learned torques.
-        identified_gaits: Play gaits that were optimised again with the identified model.
+        gait_model: Model that its gaits are optimised with, one of `GAIT_MODELS`: the URDF's, which
+            the shipped gaits are; with the rotors' inertia of the datasheet (`RobotSpec.rotors`),
+            which the torques of source "model" know then, too; or the identified one.
+        knows: What its torques, or its gaits beyond those that all play, are computed from: some of
+            `KNOWLEDGE`.
         law: Learning law of the stance that is switched on later, if any.
         flight_law: Learning law of the flight, likewise.
         coupling: Share of the stance's errors that the flight's law is shown beyond its end; 0 to
@@ -66,7 +81,8 @@ class ControllerSpec:
 
     name: str
     source: str = "none"
-    identified_gaits: bool = False
+    gait_model: str = "urdf"
+    knows: tuple[str, ...] = ()
     law: LearningLaw | None = None
     flight_law: LearningLaw | None = None
     coupling: float = 1.0
@@ -86,8 +102,17 @@ class ControllerSpec:
         file_name("name of a controller", self.name)
         prefix = f"controller '{self.name}': "
         known_name("source of feedforward", self.source, SOURCES)
-        for name in ("identified_gaits", "imu"):
-            flag(prefix + name, getattr(self, name))
+        known_name("model of the gaits", self.gait_model, GAIT_MODELS)
+        if self.gait_model == "identified" and self.source != "identified":
+            raise InvalidInput(
+                f"{prefix}gaits of the identified model go with its torques; "
+                "give source='identified' too"
+            )
+        knows = sequence_of(f"{prefix}knows", self.knows, text)
+        for known in knows:
+            known_name("knowledge", known, KNOWLEDGE)
+        object.__setattr__(self, "knows", knows)
+        flag(f"{prefix}imu", self.imu)
         for name in ("law", "flight_law"):
             known_law(prefix + name, getattr(self, name))
         if self.timing is not None:
@@ -124,21 +149,32 @@ _ILC = ControllerSpec(
 )
 """Learning from nothing, over the whole stride."""
 
+_URDF, _IDENTIFIED = ("urdf",), ("urdf", "rotors", "friction", "load")
+
+_STIFF = Gains(kp=(140.0, 240.0, 360.0), kd=(2.0, 12.0, 4.0))
+"""Four times the paper's stiffness and twice its damping."""
+
 CONTROLLERS = {
     spec.name: spec
     for spec in (
         ControllerSpec("pd"),
         _ILC,
-        ControllerSpec("model", source="model"),
+        ControllerSpec("model", source="model", knows=_URDF),
         ControllerSpec("library", source="library", timing=FlightTiming()),
-        replace(_ILC, name="model+ilc", source="model"),
+        replace(_ILC, name="model+ilc", source="model", knows=_URDF),
         replace(_ILC, name="library+ilc", source="library"),
         ControllerSpec("ilc-stance", law=PDTypeILC()),
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
-        ControllerSpec("identified", source="identified"),
-        ControllerSpec("identified+gait", source="identified", identified_gaits=True),
+        ControllerSpec("identified", source="identified", knows=_IDENTIFIED),
+        ControllerSpec(
+            "identified+gait",
+            source="identified",
+            gait_model="identified",
+            timing=FlightTiming(),
+            knows=_IDENTIFIED,
+        ),
         replace(
             _ILC,
             name="ilc-zero",
@@ -146,7 +182,28 @@ CONTROLLERS = {
             flight_law=replace(FLIGHT_LAW, gain=0.0),
         ),
         replace(_ILC, name="ilc-imu", imu=True),
-        ControllerSpec("model+timing", source="model", timing=FlightTiming()),
+        ControllerSpec("model+timing", source="model", timing=FlightTiming(), knows=_URDF),
+        ControllerSpec(
+            "model+rotors",
+            source="model",
+            gait_model="datasheet",
+            timing=FlightTiming(),
+            knows=("urdf", "rotors"),
+        ),
+        replace(_ILC, name="ilc+rotors", gait_model="datasheet", knows=("rotors",)),
+        ControllerSpec("pd-stiff", gains=_STIFF),
+        ControllerSpec(
+            "model+rotors-stiff",
+            source="model",
+            gait_model="datasheet",
+            timing=FlightTiming(),
+            gains=_STIFF,
+            knows=("urdf", "rotors"),
+        ),
+        replace(_ILC, name="ilc-stiff", gains=_STIFF),
+        replace(
+            _ILC, name="ilc+rotors-stiff", gait_model="datasheet", gains=_STIFF, knows=("rotors",)
+        ),
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }

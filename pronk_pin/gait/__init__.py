@@ -12,6 +12,7 @@ from .gait import Gait, GaitPhase, Motion, known_gaits
 from .library import GaitLibrary, load_library
 from .optimisation import GaitSolution, SolverState, optimize_gait, vertical_hop
 from .problem import BOUND, PRONK, ContactPhase, GaitProblem
+from .replan import replan
 from .residual import GaitResidual, gait_residual
 from .style import SPEEDS, STYLES, Style, gait_problem, known_base, load_style, number_range
 
@@ -46,5 +47,6 @@ __all__ = [
     "load_style",
     "number_range",
     "optimize_gait",
+    "replan",
     "vertical_hop",
 ]

@@ -360,8 +360,8 @@ def _library(
     }
     for name in ("cost", "iterations", "solve_time", "work_time"):
         metadata[name] = [part.metadata[name][0] for part in parts]
-    gaits, audits = (tuple(getattr(part, key)[0] for part in parts) for key in ("gaits", "audit"))
-    return GaitLibrary(gaits, metadata, audits, home)
+    gaits = tuple(part.gaits[0] for part in parts)
+    return GaitLibrary(gaits, metadata, tuple(part.audit[0] for part in parts), home)
 
 
 def _worst_orders(each: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

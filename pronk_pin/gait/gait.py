@@ -11,6 +11,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from . import bezier
 
 ARRAYS = ("joints", "base", "tau", "lam")
 """Coefficient arrays of a phase."""
+
+_Value = TypeVar("_Value", float, Array)
 
 
 @dataclass(frozen=True)
@@ -178,8 +181,8 @@ class Gait:
         head = [self.robot, float(self.speed).hex(), float(self.apex).hex(), phases]
         digest = hashlib.sha256(json.dumps(head).encode())
         for phase in self.phases:
-            for name in ARRAYS:
-                digest.update(getattr(phase, name).astype("<f8").tobytes())
+            for coefficients in (phase.joints, phase.base, phase.tau, phase.lam):
+                digest.update(coefficients.astype("<f8").tobytes())
         return digest.hexdigest()
 
     def phase(self, name: str) -> GaitPhase:
@@ -220,20 +223,22 @@ class Gait:
         if kinds[0] != kinds[1]:
             raise InvalidInput("the two gaits differ in phases or orders; blend gaits of one kind")
 
-        def mix(a: float, b: float) -> float:
+        def mix(a: _Value, b: _Value) -> _Value:
             return (1.0 - weight) * a + weight * b
 
-        phases = []
-        for own_phase, other_phase in zip(self.phases, other.phases, strict=True):
-            mixed = {
-                name: (1.0 - weight) * getattr(own_phase, name)
-                + weight * getattr(other_phase, name)
-                for name in ARRAYS
-            }
-            duration = mix(own_phase.duration, other_phase.duration)
-            phases.append(GaitPhase(own_phase.name, own_phase.feet, duration, **mixed))
-        speed, apex = mix(self.speed, other.speed), mix(self.apex, other.apex)
-        return Gait(self.robot, speed, apex, tuple(phases))
+        phases = tuple(
+            GaitPhase(
+                own.name,
+                own.feet,
+                duration=mix(own.duration, others.duration),
+                joints=mix(own.joints, others.joints),
+                base=mix(own.base, others.base),
+                tau=mix(own.tau, others.tau),
+                lam=mix(own.lam, others.lam),
+            )
+            for own, others in zip(self.phases, other.phases, strict=True)
+        )
+        return Gait(self.robot, mix(self.speed, other.speed), mix(self.apex, other.apex), phases)
 
 
 def known_gaits(robot: Robot, gaits: Sequence[Gait]) -> tuple[Gait, ...]:

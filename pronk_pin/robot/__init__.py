@@ -17,7 +17,7 @@ from .conventions import (
 )
 from .parameters import NOTHING, SLIDING, ModelParameters
 from .robot import NB, NL, Robot, load_robot
-from .robot_spec import JOINTS, ROBOTS, RobotSpec
+from .robot_spec import JOINTS, ROBOTS, ROTOR, RobotSpec
 from .state import (
     REFUSALS,
     as_array,
@@ -40,6 +40,7 @@ __all__ = [
     "NOTHING",
     "REFUSALS",
     "ROBOTS",
+    "ROTOR",
     "SLIDING",
     "Base",
     "ModelParameters",

@@ -205,12 +205,6 @@ class Robot:
             return tau
         return np.asarray(self.parameters.torque_constant * tau - self.friction(rates))
 
-    def motor_torques(self, torques: Array, rates: Array) -> Array:
-        """Motor commands for joint torques: the inverse of `joint_torques`."""
-        if self.parameters.ideal_motors:
-            return torques
-        return np.asarray((torques + self.friction(rates)) / self.parameters.torque_constant)
-
     @cached_property
     def standing(self) -> Array:
         """Standing posture with the feet on the ground z = 0, shape (19,)."""

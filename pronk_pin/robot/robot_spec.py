@@ -17,6 +17,13 @@ from ..storage import check_file
 JOINTS = ("hip", "thigh", "calf")
 """Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
 
+ROTOR = 0.000111842 * 9.0**2
+"""Rotor inertia of Unitree's motor as the joint feels it, through the gear [kg m^2]: about its own
+axis that of the links *_rotor of go1.urdf in example-robot-data (the A1 has the same motor, and its
+URDF leaves the rotors out); gear ratio: the paper, section II.A."""
+
+_ROTOR = Interval(0, 10, "kg m^2")
+
 _DATA_DISTRIBUTION = "example-robot-data"
 
 
@@ -37,6 +44,9 @@ class RobotSpec:
             all legs one after the other.
         foot_radius: Radius of the spherical feet [m]; None to read it from the collision sphere
             in the URDF.
+        rotors: Rotor inertia of a leg's joints as they feel it, through the gear [kg m^2], from the
+            motors' datasheet; one for each of `joints`, or none where it is not known. The URDF's
+            model is without it; controllers that know it say so.
     """
 
     name: str
@@ -48,6 +58,7 @@ class RobotSpec:
     foot_pattern: str = "{leg}_foot"
     standing: tuple[float, ...] = (0.0, 0.9, -1.8)
     foot_radius: float | None = None
+    rotors: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         file_name("name", self.name)
@@ -65,6 +76,13 @@ class RobotSpec:
             )
         radius = none_or(real, "foot_radius", self.foot_radius, Interval(0, unit="m"))
         object.__setattr__(self, "foot_radius", radius)
+
+        object.__setattr__(self, "rotors", reals("rotors", self.rotors, _ROTOR))
+        if len(self.rotors) not in (0, len(self.joints)):
+            raise InvalidInput(
+                f"rotors has {len(self.rotors)} inertias; give {len(self.joints)}, one for each "
+                "joint of a leg, or none"
+            )
 
     def _check_patterns(self) -> None:
         for name in ("joint_pattern", "foot_pattern"):
@@ -95,14 +113,15 @@ class RobotSpec:
 ROBOTS = {
     spec.name: spec
     for spec in (
-        RobotSpec("a1", "a1_description/urdf/a1.urdf"),
-        RobotSpec("go1", "go1_description/urdf/go1.urdf"),
+        RobotSpec("a1", "a1_description/urdf/a1.urdf", rotors=(ROTOR,) * 3),
+        RobotSpec("go1", "go1_description/urdf/go1.urdf", rotors=(ROTOR,) * 3),
         RobotSpec(
             "go2",
             "go2_description/urdf/go2.urdf",
             base_link="base",
             # The feet are meshes; half their extent fore and aft, 45.3 mm, of foot_convex.stl.
             foot_radius=0.0227,
+            rotors=(ROTOR,) * 3,  # taken for the A1's
         ),
         RobotSpec(
             "solo12",

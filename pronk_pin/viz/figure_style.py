@@ -34,8 +34,11 @@ PALETTE = {
     "brown": "#5C3A21",
     "indigo": "#4B0082",
     "ultramarine": "#2222EE",
+    "maroon": "#A60445",
+    "olive": "#858F23",
+    "emerald": "#04BC73",
 }
-"""The colours by name; yellow is too light for lines on white. The last four are not of theirs."""
+"""The colours by name; yellow is too light for lines on white. The last seven are not of theirs."""
 
 REFERENCE, ACCENT = PALETTE["grey"], PALETTE["vermilion"]
 """Colours of references, and of events and limits."""
@@ -79,6 +82,9 @@ LOOKS = {
     "model": Look("PD + model", PALETTE["orange"], _DASH_DOT, "s"),
     "library": Look("PD + library", PALETTE["sky"], _SHORT, "^"),
     "ilc": Look("ILC", PALETTE["blue"], "-", "o"),
+    "ilc+rotors": Look("ILC, gaits with rotors", PALETTE["emerald"], _SHORT, "h"),
+    "ilc-stance": Look("ILC, stance only", PALETTE["olive"], _DASHED, "d"),
+    "model+rotors": Look("PD + model with rotors, gaits too", PALETTE["maroon"], "-", "p"),
     "model+ilc": Look("ILC seeded by the model", PALETTE["green"], _DASHED, "D"),
     "library+ilc": Look("ILC seeded by the library", PALETTE["ultramarine"], _SHORT, "<"),
     "ilc-paper": Look("ILC, the paper's law", PALETTE["vermilion"], _DASH_DOT, "v"),

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -14,14 +14,18 @@ from pronk_pin.control import (
     Controller,
     ControllerSpec,
     Gains,
+    LawContext,
+    NormOptimalILC,
+    PaperILC,
     PDTypeILC,
     PhaseLog,
+    StrideRecord,
     Tape,
     ZeroPhaseFilter,
     load_controller,
     phase_grid,
 )
-from pronk_pin.errors import InvalidInput, UnknownName
+from pronk_pin.errors import InvalidInput, LeakyFilter, UnknownName
 from pronk_pin.gait import Gait
 from pronk_pin.kinematics import leg_angle
 from pronk_pin.robot import Robot
@@ -328,6 +332,73 @@ def test_standing_holds_the_posture_in_which_stance_begins(
     assert not tape.feedforward.any()
 
 
+@dataclass(frozen=True)
+class Noting:
+    """A law that notes where it is going to learn, and answers something to `bind`."""
+
+    answer: object = field(default_factory=PDTypeILC)
+    contexts: list[LawContext] = field(default_factory=list)
+
+    def bind(self, context: LawContext) -> object:
+        self.contexts.append(context)
+        return self.answer
+
+    def update(self, record: StrideRecord) -> Array:
+        raise AssertionError("the law that it answered was to learn")
+
+
+def test_each_law_is_bound_once_to_its_part_of_the_stride(
+    robot: Robot,
+    gaits: list[Gait],
+    stances: Callable[..., PhaseLog],
+    learn: Callable[..., Tape],
+) -> None:
+    stance, flight = Noting(), Noting()
+    spec = ControllerSpec("mine", law=stance, flight_law=flight)
+    learn(Controller(robot, gaits, spec, timestep=DT), stances(0.1))
+    (of_stance,), (of_flight,) = stance.contexts, flight.contexts
+    assert (of_stance.part, of_flight.part) == ("stance", "flight")
+    assert of_stance.robot is robot
+    assert of_stance.gaits == tuple(gaits)
+    assert (of_stance.controller, of_stance.base) == ("mine", "locked")
+    assert (of_stance.gains, of_stance.timestep) == (Gains(), DT)
+
+
+def test_a_bind_that_answers_no_law_is_refused(robot: Robot, gaits: list[Gait]) -> None:
+    spec = ControllerSpec("mine", law=Noting(answer=None))
+    with pytest.raises(
+        InvalidInput, match=r"Noting of controller 'mine' returned nothing from bind"
+    ):
+        Controller(robot, gaits, spec, timestep=DT)
+
+
+def test_a_law_with_a_model_of_the_stance_on_a_locked_base_is_refused_elsewhere(
+    robot: Robot, gaits: list[Gait]
+) -> None:
+    in_flight = ControllerSpec("mine", flight_law=NormOptimalILC())
+    with pytest.raises(InvalidInput, match="a model of the stance as that of the flight"):
+        Controller(robot, gaits, in_flight, timestep=DT)
+    spec = load_controller("ilc-norm-optimal")
+    with pytest.raises(InvalidInput, match=r"counts on a level trunk; .* or base 'locked'"):
+        Controller(robot, gaits, spec, timestep=DT, base="sagittal")
+
+
+def test_a_law_whose_filter_leaks_warns_where_its_controller_is_made(
+    robot: Robot, gaits: list[Gait]
+) -> None:
+    with pytest.warns(LeakyFilter) as caught:
+        Controller(robot, gaits, ControllerSpec("mine", law=PaperILC()), timestep=DT)
+    assert [warning.filename for warning in caught] == [__file__]
+
+
+def test_only_a_trunk_that_may_turn_is_balanced(robot: Robot, gaits: list[Gait]) -> None:
+    made = {
+        base: Controller(robot, gaits, load_controller("ilc"), timestep=DT, base=base)
+        for base in ("locked", "sagittal", "free")
+    }
+    assert {base for base, controller in made.items() if controller.balance is None} == {"locked"}
+
+
 def test_a_feedforward_of_the_wrong_shape_is_refused(robot: Robot, gaits: list[Gait]) -> None:
     with pytest.raises(
         InvalidInput, match=r"feedforward of shape \(2, 161, 12\); expected \(2, 2,"
@@ -393,3 +464,14 @@ def test_the_reason_why_a_stride_teaches_nothing_is_told(
     learn(controller, stances(0.1), upright=np.array([False, True]))
     assert [SKIPPED[code] for code in controller.skipped] == ["fallen", "not finite"]
     np.testing.assert_array_equal(controller.feedforward, 0.0)
+
+
+def test_a_share_of_what_lies_beyond_is_shown() -> None:
+    """Half of it: between the last error, which is held, and what follows."""
+    error = np.zeros((1, SAMPLES, 12))
+    own = StrideRecord.of(error + 0.2, error, error, error)
+    following = StrideRecord.of(error + 0.6, error + 1.0, error, error)
+    half = own.onward(following, np.array([1.0]), 0.5)
+    np.testing.assert_allclose(half.error_onward, 0.4)
+    np.testing.assert_allclose(half.rate_onward, 0.5)
+    np.testing.assert_allclose(own.onward(following, np.array([1.0])).error_onward, 0.6)

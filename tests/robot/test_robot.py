@@ -51,7 +51,8 @@ def test_base_pitch_becomes_a_rotation_about_y(robot: Robot) -> None:
 
 def test_a_robot_is_loaded_once(robot: Robot) -> None:
     assert load_robot("a1") is robot
-    assert load_robot(RobotSpec("a1", "a1_description/urdf/a1.urdf")) is robot
+    again = RobotSpec("a1", "a1_description/urdf/a1.urdf", rotors=ROBOTS["a1"].rotors)
+    assert load_robot(again) is robot
 
 
 def test_an_unknown_robot_is_answered_with_the_known_ones() -> None:

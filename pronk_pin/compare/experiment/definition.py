@@ -131,7 +131,7 @@ def differences(before: object, now: object, *, most: int = 3) -> str:
 
 def _differences(before: object, now: object, path: str) -> Iterator[str]:
     if isinstance(before, Mapping) and isinstance(now, Mapping):
-        for key in sorted({*before, *now}):
+        for key in sorted({*before, *now}, key=lambda key: (key != "name", key)):
             there, here = before.get(key, "nothing"), now.get(key, "nothing")
             yield from _differences(there, here, f"{path}.{key}" if path else str(key))
     elif before != now:

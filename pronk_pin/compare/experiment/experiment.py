@@ -19,9 +19,9 @@ from tyro.conf import Suppress
 from ..._checks import instance_of, known_name, path, real, seed, sequence_of, text
 from ...control import load_controller
 from ...errors import InvalidInput
-from ...gait import SPEEDS, Gait, load_library
-from ...robot import BASES, ROBOTS, load_robot
-from ..identification import explain, identified_gaits
+from ...gait import SPEEDS, Gait, load_library, replan
+from ...robot import BASES, ROBOTS, ModelParameters, Robot, load_robot
+from ..identification import explain
 from ..simulation import Progress, Schedule, simulate
 from ..world import load_scenario
 from .definition import cell_definition, define, fingerprint, to_text
@@ -30,7 +30,10 @@ from .initial_feedforward import initial_feedforward, learned_strides
 LEARNED = ("library", "identified")
 """Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
 
-DEFAULT_CONTROLLERS = ("pd", "ilc", "model", "library", "model+ilc")
+DEFAULT_CONTROLLERS = (
+    *("pd", "ilc-paper", "ilc-stance", "ilc", "ilc+rotors"),
+    *("model", "model+rotors", "library"),
+)
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ class Experiment:
                 raise InvalidInput(f"{name} must name at least one, and none of them twice")
         _ = self.gaits  # there is one of each speed
         for controller in self.controllers:
+            if load_controller(controller).gait_model == "datasheet":
+                _ = with_rotors(load_robot(self.robot))  # the datasheet is there
             if load_controller(controller).source == "identified" and self.base != "locked":
                 raise InvalidInput(
                     f"controller '{controller}' identifies the robot on the locked base; leave it "
@@ -243,7 +248,10 @@ def run_cell(
     spec, model = load_controller(cell.controller), robot
     if spec.source == "identified":
         model = explain(learned_strides(spec, dependency)).identified
-        gaits = identified_gaits(model, gaits) if spec.identified_gaits else gaits
+    elif spec.gait_model == "datasheet":
+        model = with_rotors(robot)
+    if spec.gait_model != "urdf":
+        gaits = replan(model, gaits, base="locked" if cell.base == "locked" else "sagittal")
     return simulate(
         robot,
         gaits,
@@ -257,6 +265,20 @@ def run_cell(
         attributes=_attributes(cell),
         progress=progress,
     )
+
+
+def with_rotors(robot: Robot) -> Robot:
+    """The robot with the rotors' inertia of its datasheet.
+
+    Raises:
+        InvalidInput: That is not known.
+    """
+    if not robot.spec.rotors:
+        raise InvalidInput(
+            f"the rotors of {robot.name} are not known; give RobotSpec(rotors=...) their inertia, "
+            "or choose controllers that do not need it, as 'pd', 'model' and 'ilc'"
+        )
+    return robot.with_parameters(ModelParameters(armature=robot.spec.rotors))
 
 
 def _gaits(robot: str, base: str, speeds: tuple[float, ...]) -> list[Gait]:

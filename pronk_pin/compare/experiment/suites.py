@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
 from ..._checks import known_name
+from ..simulation import Schedule
 from ..world import MISMATCHES, random_scenarios
 from .experiment import Experiment
 
+_FOUR_SPEEDS = (-0.4, 0.0, 0.4, 0.8)
+
 SUITES: Mapping[str, Mapping[str, Any]] = {
     "default": {},
-    "mismatch": {"scenarios": MISMATCHES},
+    "knowledge": {
+        "speeds": _FOUR_SPEEDS,
+        "controllers": ("pd", "ilc", "ilc+rotors", "model", "model+rotors", "identified+gait"),
+        "scenarios": (
+            *("nominal", "ideal", "payload", "weak-motors", "delay"),
+            *(scenario.name for scenario in random_scenarios(8, seed=0)),
+        ),
+    },
+    "pairs": {
+        "speeds": _FOUR_SPEEDS,
+        "controllers": ("pd", "ilc"),
+        "scenarios": tuple("+".join(pair) for pair in itertools.combinations(MISMATCHES, 2)),
+        "schedule": Schedule(baseline=4.0, learning=60.0),
+    },
+    "mismatch": {
+        "controllers": ("pd", "ilc", "ilc+rotors", "model", "model+rotors"),
+        "scenarios": MISMATCHES,
+    },
     "sampled": {
-        "speeds": (-0.4, 0.0, 0.4, 0.8),
+        "speeds": _FOUR_SPEEDS,
         "controllers": ("pd", "model", "ilc"),
         "scenarios": tuple(scenario.name for scenario in random_scenarios(20, seed=0)),
     },
@@ -24,10 +45,11 @@ SUITES: Mapping[str, Mapping[str, Any]] = {
     },
     "paper": {"controllers": ("pd", "ilc", "ilc-paper"), "seeds": tuple(range(5))},
 }
-"""Changes of each suite to `Experiment()`: the paper's speeds under five controllers; the same in
-every scenario of the list of mismatches; learning against the model in 20 sampled scenarios, at
-four speeds only, as the worlds are the sample; the control arm, which must show nothing; Table I
-with intervals over seeds, and with the paper's own learning law."""
+"""Changes of each suite to `Experiment()`: the paper's speeds under `DEFAULT_CONTROLLERS`; what a
+model must know to be as good as practice, scenario by scenario; long learning in every pair of the
+list of mismatches; the paper's speeds in every scenario of that list; learning against the model in
+20 sampled scenarios, at four speeds only, as the worlds are the sample; the control arm, which
+learns with gain 0; Table I with intervals over seeds, and with the paper's own learning law."""
 
 
 def load_suite(name: str) -> Experiment:

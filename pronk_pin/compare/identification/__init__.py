@@ -6,7 +6,6 @@ Goes out: an `Explanation`: parameters with intervals, shares by cause, an ident
 
 from .explanation import DRAWS, IMU_NOISE, Explanation, check_learner, explain
 from .findings import describe, foreign, remarks
-from .identified_gaits import identified_gaits
 from .model_terms import TERMS, Motion, Term
 from .shares import discrepancy, explained, share_table
 
@@ -23,7 +22,6 @@ __all__ = [
     "explain",
     "explained",
     "foreign",
-    "identified_gaits",
     "remarks",
     "share_table",
 ]

@@ -7,6 +7,12 @@ normal equations are made of pairs of different strides,
 
 whose noise is independent: instrumental variables, with every other stride as the instrument (all
 split halves at once). The rows' weights W are robust, so that what no term describes is outvoted.
+
+The delay shifts the commanded torque, and is not linear. The profile of the least squares over
+delays a millisecond apart says where to begin; from there each round linearises about the delay of
+the last one (Gauss and Newton). In the end the delay stands among the linear parameters with its
+own column, so that covariance and intervals are joint ones, and those of the others hold the
+uncertainty of the shift.
 """
 
 from __future__ import annotations
@@ -17,15 +23,18 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.optimize
+import scipy.stats
 
-from ..._typing import Array, BoolArray
-from .equations import GROUPS, Equations
+from ..._typing import Array, BoolArray, IntArray
+from .equations import EVERY, GROUPS, WINDOW, DelayedEquations, Equations
 from .model_terms import Term
 
 _ROUNDS = 12
 _TUKEY = 4.685  # 95 % efficiency with normal noise
 _FLOOR = np.array([0.05, 0.05, 0.005, 0.005, 0.005])
 """Least standard deviation of a row, by group [N, N, N m, N m, N m]: no model is better."""
+_OVERLAP = WINDOW / (1.5 * EVERY)
+"""Rows that share one error: as long as a window of Hann is at equal height."""
 PRIOR = 3.0
 """Standard deviation of what is believed of a parameter beforehand, in its term's scale."""
 
@@ -47,6 +56,8 @@ class Estimate:
         value: The parameters, shape (terms,).
         draws: Deviations of the parameters, their bounds aside, with strides and speeds drawn
             anew, shape (draws, terms).
+        model_error: Standard deviation of the parameters by what no model describes, which is the
+            same in every stride, shape (terms,).
         information: How much the rows tell of the parameters, in the terms' scales; inverse of
             their covariance if the rows' errors were independent, shape (terms, terms).
         rest: Root mean square of what no term describes of the strides' mean, by group [N, N, N m,
@@ -57,6 +68,7 @@ class Estimate:
 
     value: Array
     draws: Array
+    model_error: Array
     information: Array
     rest: Array
     noise: Array
@@ -65,14 +77,18 @@ class Estimate:
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """Ends of the intervals, shape (terms,) each.
 
-        Symmetric, and as if there were no bounds: an estimate on its bound is not sure of it.
+        Symmetric, and as if there were no bounds: an estimate on its bound is not sure of it. The
+        model's error adds to the scatter, which alone would promise too much where nothing is
+        noisy.
         """
-        reach = np.percentile(np.abs(self.draws), 100.0 * level, axis=0)
+        scatter = np.percentile(np.abs(self.draws), 100.0 * level, axis=0)
+        model_error = scipy.stats.norm.ppf(0.5 + 0.5 * level) * self.model_error
+        reach = np.hypot(scatter, model_error)
         return self.value - reach, self.value + reach
 
 
 def estimate(
-    rows: Mapping[float, Equations],
+    equations: Mapping[float, DelayedEquations],
     terms: tuple[Term, ...],
     *,
     rng: np.random.Generator,
@@ -82,7 +98,7 @@ def estimate(
     """Fit the terms to the rows of all speeds.
 
     Args:
-        rows: The rows by speed.
+        equations: The rows by speed.
         terms: The terms.
         rng: Source of the strides and speeds drawn for the intervals.
         draws: How many.
@@ -90,29 +106,66 @@ def estimate(
             that do not repeat: biased by noise.
     """
     scale = np.array([term.scale for term in terms])
-    weights = {speed: _flight_first(equations) for speed, equations in rows.items()}
+    weights = {speed: _flight_first(each.group) for speed, each in equations.items()}
     sigma = np.ones(len(GROUPS))
-    value = np.zeros(len(terms))
+    value = _start(equations, weights, terms, others)
     normal: dict[float, Normal] = {}
     for _ in range(_ROUNDS):
+        rows = {speed: each.at(value) for speed, each in equations.items()}
         normal = {
-            speed: _normal(equations, weights[speed] / sigma[equations.group] ** 2, scale)
-            for speed, equations in rows.items()
+            speed: _normal(each, weights[speed] / sigma[each.group] ** 2, scale)
+            for speed, each in rows.items()
         }
         value = _solve(*_sum(normal, others), terms)
-        residual = {
-            speed: equations.y.mean(axis=0) - equations.A.mean(axis=0) @ value
-            for speed, equations in rows.items()
-        }
+        rows = {speed: each.at(value) for speed, each in equations.items()}
+        residual = {speed: _mean_residual(each, value) for speed, each in rows.items()}
         sigma = _spread(rows, residual)
         weights = {
-            speed: _tukey(residual[speed] / sigma[equations.group])
-            for speed, equations in rows.items()
+            speed: _tukey(residual[speed] / sigma[each.group]) for speed, each in rows.items()
         }
     information, _ = total = _sum(normal, others)
     free = _unbounded(*total) * scale
     drawn = np.array([_unbounded(*_drawn(normal, others, rng)) for _ in range(draws)]) * scale
-    return Estimate(value, drawn - free, information, *_fit(rows, value))
+    at_best = {
+        speed: _normal(each, weights[speed] / _FLOOR[each.group] ** 2, scale)
+        for speed, each in rows.items()
+    }
+    root, vectors = _root(_sum(at_best, others)[0])
+    model_error = scale * np.sqrt(_OVERLAP * ((vectors / root) ** 2).sum(axis=1))
+    return Estimate(value, drawn - free, model_error, information, *_fit(rows, value))
+
+
+def _start(
+    equations: Mapping[float, DelayedEquations],
+    weights: Mapping[float, Array],
+    terms: tuple[Term, ...],
+    others: bool,
+) -> Array:
+    """The parameters to begin with: the best of the delays on a grid, with the others' estimates
+    given it."""
+    delay = next((k for k, term in enumerate(terms) if term.column is None), None)
+    if delay is None:
+        return np.zeros(len(terms))
+    linear = (*terms[:delay], *terms[delay + 1 :])
+    scale = np.array([term.scale for term in linear])
+    best, least = np.zeros(len(terms)), np.inf
+    for shift in next(iter(equations.values())).torque.x:
+        if not terms[delay].lower <= shift <= terms[delay].upper:
+            continue
+        rows = {speed: each.given_delay(shift) for speed, each in equations.items()}
+        normal = {speed: _normal(each, weights[speed], scale) for speed, each in rows.items()}
+        value = _solve(*_sum(normal, others), linear)
+        squares = sum(
+            float(weights[speed] @ _mean_residual(each, value) ** 2) for speed, each in rows.items()
+        )
+        if squares < least:
+            best, least = np.insert(value, delay, shift), squares
+    return best
+
+
+def _mean_residual(rows: Equations, value: Array) -> Array:
+    """What parameters leave of the strides' mean, shape (m,)."""
+    return np.asarray(rows.y.mean(axis=0) - rows.A.mean(axis=0) @ value)
 
 
 def _fit(rows: Mapping[float, Equations], value: Array) -> tuple[Array, Array, Array]:
@@ -132,9 +185,9 @@ def _fit(rows: Mapping[float, Equations], value: Array) -> tuple[Array, Array, A
     return residual, noise, size
 
 
-def _flight_first(rows: Equations) -> Array:
+def _flight_first(group: IntArray) -> Array:
     """Weights to begin with: flight, where no contact can mislead, if it was recorded."""
-    flying = rows.group >= 2
+    flying = group >= 2
     return np.where(flying, 1.0, 0.0) if flying.any() else np.ones(len(flying))
 
 

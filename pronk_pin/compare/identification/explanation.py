@@ -15,13 +15,13 @@ from ...control import CONTROLLERS
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
 from ...robot import ModelParameters, Robot, load_robot
-from ..world import Scenario
-from .equations import Equations, PhaseForces, equations, phase_forces
+from .equations import DelayedEquations, PhaseForces, equations, phase_forces
 from .estimate import Confounding, Estimate, confounding, estimate, repetition
 from .ground_survey import Ground, survey
-from .model_terms import TERMS, Term, parameters, truth
+from .model_terms import TERMS, Term, parameters
 from .recording import PARTS, PhaseRecording, recordings
 from .shares import share_table, shares
+from .truth import true_parameters
 
 IMU_NOISE = Interval(0, 1000, "m/s^2")
 DRAWS = Interval(2, 1_000_000)
@@ -139,7 +139,7 @@ def explain(
         speed: tuple(phase_forces(robot, phase, terms) for phase in phases)
         for speed, phases in recorded.items()
     }
-    rows = {speed: equations(robot, phases_) for speed, phases_ in forces.items()}
+    rows = {speed: equations(robot, phases_, terms) for speed, phases_ in forces.items()}
     used, repeated = _repeating(rows, terms)
     fit = estimate({v: rows[v] for v in used}, terms, rng=rng, draws=draws, others=repeated)
     played = _gaits(strides, gaits)
@@ -160,7 +160,7 @@ def explain(
         left_out=tuple(float(v) for v in strides["speed"].to_numpy() if float(v) not in set(used)),
         strides=min(forces[speed][0].recording.strides for speed in used),
         repeated=repeated,
-        true=_truth(strides),
+        true=true_parameters(robot, strides),
         attributes={key: str(value) for key, value in strides.attrs.items()},
     )
 
@@ -180,11 +180,13 @@ def check_learner(controller: str) -> None:
 
 
 def _repeating(
-    rows: Mapping[float, Equations], terms: tuple[Term, ...]
+    rows: Mapping[float, DelayedEquations], terms: tuple[Term, ...]
 ) -> tuple[list[float], bool]:
     """Speeds whose strides repeat, or all of them where none do; whether they do."""
     repeating = [
-        speed for speed, equations in rows.items() if repetition(equations, terms) > REPEATS
+        speed
+        for speed, each in rows.items()
+        if repetition(each.at(np.zeros(len(terms))), terms) > REPEATS
     ]
     return (repeating, True) if repeating else (list(rows), False)
 
@@ -205,11 +207,3 @@ def _by_part(phases: tuple[PhaseForces, ...]) -> dict[str, PhaseForces]:
 
 def _stances(recorded: Iterable[tuple[PhaseRecording, ...]]) -> list[PhaseRecording]:
     return [phase for phases in recorded for phase in phases if phase.part == "stance"]
-
-
-def _truth(strides: xr.Dataset) -> dict[str, float]:
-    """The true parameters, as the strides' attributes tell them."""
-    try:
-        return truth(Scenario.from_json(strides.attrs["scenario_parameters"]))
-    except (KeyError, InvalidInput):
-        return {}

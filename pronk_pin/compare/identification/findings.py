@@ -59,7 +59,8 @@ def format_parameters(explanation: Explanation) -> str:
             cells = f"{row['estimate']:10.{digits}f}  [{low},{high}]"
         else:
             cells = f"{'-':>10}  {'not seen':^19}"
-        truth = f"{row['true']:9.{digits}f}" if has_truth else ""
+        known = f"{row['true']:9.{digits}f}" if np.isfinite(row["true"]) else f"{'-':>9}"
+        truth = known if has_truth else ""
         lines.append(f"{name:<18}{cells}{truth}  {row['unit']}")
     return "\n".join(lines)
 

@@ -2,10 +2,11 @@
 
 Everything is linear: with the parameters theta of the terms,
 
-    S tau - rnea(q, v, a) + J^T lam = sum_i column_i(q, v, a, tau) theta_i
+    S tau(t - d) - rnea(q, v, a) + J^T lam = sum_i column_i(q, v, a, tau(t - d)) theta_i
 
-where `rnea` is Pinocchio's inverse dynamics of the URDF. A term of one's own is a function of a
-`Motion` and a line in `TERMS`.
+where `rnea` is Pinocchio's inverse dynamics of the URDF, and tau(t - d) the torque that was
+commanded d ago. The delay d of the motors alone is not linear: it has no column, and is looked for.
+A term of one's own is a function of a `Motion` and a line in `TERMS`.
 """
 
 from __future__ import annotations
@@ -20,11 +21,10 @@ import pinocchio as pin
 
 from ..._typing import Array
 from ...robot import JOINTS, NB, NOTHING, ModelParameters, Robot
-from ..world import Scenario
 
 
 class Motion(NamedTuple):
-    """Recorded motion and commanded torques at n instants, in Pinocchio's layout."""
+    """Recorded motion and torques at n instants, in Pinocchio's layout."""
 
     q: Array
     """Configurations, shape (n, 19)."""
@@ -37,9 +37,7 @@ class Motion(NamedTuple):
     direction: Array
     """Their signs, from less noisy velocities, between -1 and 1, shape (n, 12)."""
     tau: Array
-    """Commanded torques of the motors [N m], shape (n, 12)."""
-    tau_rate: Array
-    """Their rates of change [N m/s], shape (n, 12)."""
+    """Torques that the motors were told, as late as they are [N m], shape (n, 12)."""
 
 
 Column = Callable[[Robot, Motion], Array]
@@ -47,7 +45,7 @@ Column = Callable[[Robot, Motion], Array]
 
 @dataclass(frozen=True)
 class Term:
-    """A term that the model may lack: one linear parameter.
+    """A term that the model may lack: one parameter, linear but for the delay.
 
     Attributes:
         name: Its name, as in tables.
@@ -56,8 +54,9 @@ class Term:
         scale: Size that a robot of this kind could have; the estimate is drawn to zero, very
             weakly, in this measure.
         lower, upper: Bounds of the parameter.
-        column: Generalised force of a unit of the parameter, shape (n, 18).
+        column: Generalised force of a unit of the parameter, shape (n, 18); None for the delay.
         advice: Which experiment would tell it from others.
+        of_torque: Whether the column depends on `Motion.tau`, and so on the delay.
     """
 
     name: str
@@ -66,8 +65,9 @@ class Term:
     scale: float
     lower: float
     upper: float
-    column: Column
+    column: Column | None
     advice: str
+    of_torque: bool = False
 
 
 def _of_joints(values: Array, robot: Robot, kind: int) -> Array:
@@ -107,18 +107,15 @@ def _weakness(robot: Robot, motion: Motion) -> Array:
     return force
 
 
-def _delay(robot: Robot, motion: Motion) -> Array:
-    force = np.zeros((len(motion.q), robot.nv))
-    force[:, NB:] = motion.tau_rate
-    return force
-
-
+LONGEST_DELAY = 0.02
+"""Longest delay of the motors that is looked for [s]."""
 _LEAST_PAYLOAD = 0.1
 """Load below which the trunk's moments are its own [kg]."""
 
 _SWING = "swing the legs in the air, slowly and fast"
 _LIFT = "let the robot fly longer, or hang its trunk up and swing the legs: then no weight acts"
 _PITCH = "let the trunk pitch (a free or a sagittal base)"
+_STEPS = "command steps of torque in the air"
 
 TERMS: tuple[Term, ...] = (
     *(
@@ -163,8 +160,8 @@ TERMS: tuple[Term, ...] = (
     Term("payload", "load", "kg", 3.0, -10.0, 30.0, partial(_trunk, parameter=0), _LIFT),
     Term("trunk moment x", "load", "kg m", 0.3, -5.0, 5.0, partial(_trunk, parameter=1), _PITCH),
     Term("trunk moment z", "load", "kg m", 0.3, -5.0, 5.0, partial(_trunk, parameter=3), _PITCH),
-    Term("weak motors", "weak motors", "1", 0.2, -1.0, 0.8, _weakness, _LIFT),
-    Term("delay", "delay", "s", 0.005, 0.0, 0.02, _delay, "command steps of torque in the air"),
+    Term("weak motors", "weak motors", "1", 0.2, -1.0, 0.8, _weakness, _LIFT, of_torque=True),
+    Term("delay", "delay", "s", 0.005, 0.0, LONGEST_DELAY, None, _STEPS),
 )
 """The terms that are looked for by default."""
 
@@ -203,21 +200,3 @@ def parameters(values: Mapping[str, float], robot: Robot) -> ModelParameters:
         trunk_shift=shift,
         torque_constant=1.0 - values.get("weak motors", 0.0),
     )
-
-
-def truth(scenario: Scenario) -> dict[str, float]:
-    """The terms' true parameters in a simulated scenario, as far as it names them."""
-    by_joint = {
-        f"{joint} {name}": getattr(scenario, field)
-        for joint in JOINTS
-        for field, name in _JOINT_TERMS.items()
-    }
-    x, _, z = scenario.payload_position
-    return {
-        **by_joint,
-        "payload": scenario.payload,
-        "trunk moment x": scenario.payload * x,
-        "trunk moment z": scenario.payload * z,
-        "weak motors": 1.0 - scenario.torque_constant,
-        "delay": scenario.delay,
-    }

@@ -18,7 +18,7 @@ from ..._typing import Array
 from ...errors import InvalidInput
 from ...robot import NB, Robot, load_robot
 from ..world import Scenario
-from .model_terms import Motion
+from .model_terms import LONGEST_DELAY, Motion
 
 PARTS = ("stance", "flight")
 """Phases of a stride in pronking."""
@@ -39,7 +39,9 @@ class PhaseRecording:
         joints: Joint angles [rad], shape (k, ticks + 1, 12).
         rates: Joint velocities [rad/s], shape (k, ticks + 1, 12).
         torque: Torques that the motors were told [N m], shape (k, ticks + 1, 12).
-        feedforward: The part of it that was feedforward [N m], shape (k, ticks + 1, 12).
+        before: Torques that the motors were told in the last ticks before the phase [N m], oldest
+            first, shape (k, before, 12).
+        feedforward: The part of `torque` that was feedforward [N m], shape (k, ticks + 1, 12).
         base: Place of the trunk, x and z [m], shape (k, ticks + 1, 2).
         base_rate: Velocity of the trunk along x and z [m/s], shape (k, ticks + 1, 2).
         fall: Acceleration of the trunk along x and z as an IMU has it [m/s^2], (k, ticks, 2): the
@@ -52,6 +54,7 @@ class PhaseRecording:
     joints: Array
     rates: Array
     torque: Array
+    before: Array
     feedforward: Array
     base: Array
     base_rate: Array
@@ -74,6 +77,23 @@ class PhaseRecording:
         """Steps of a stride."""
         return int(self.fall.shape[1])
 
+    def torque_after(self, delay: float) -> Array:
+        """Torques of motors that are late by so much [N m], shape (k, ticks, 12).
+
+        Between ticks of the commands they are interpolated.
+
+        Args:
+            delay: At most the time that `before` covers [s].
+        """
+        commanded = np.concatenate([self.before, self.torque], axis=1)
+        whole, part = divmod(delay / self.timestep, 1.0)
+        first = self.before.shape[1] - int(whole)
+        now = commanded[:, first : first + self.ticks]
+        if part == 0.0:
+            return np.asarray(now)
+        earlier = commanded[:, first - 1 : first - 1 + self.ticks]
+        return np.asarray((1.0 - part) * now + part * earlier)
+
     def motion(self, robot: Robot) -> Motion:
         """The motion of all strides, one after the other, n = k ticks."""
         k, ticks, dt = self.strides, self.ticks, self.timestep
@@ -91,7 +111,6 @@ class PhaseRecording:
             sliding=self.rates[:, 1:],
             direction=direction,
             tau=self.torque[:, :-1],
-            tau_rate=np.gradient(self.torque, dt, axis=1)[:, :-1],
         )
         return Motion(*(x.reshape(k * ticks, -1) for x in motion))
 
@@ -123,6 +142,7 @@ def recordings(
             "this result has no ticks, which explain reads; run 'pronk-pin compare' again"
         )
     timestep, lean = float(strides.attrs["timestep"]), _lean(strides)
+    history = int(np.ceil(LONGEST_DELAY / timestep)) + 2
     by_speed: dict[float, tuple[PhaseRecording, ...]] = {}
     for k, speed in enumerate(strides["speed"].to_numpy()):
         of_speed = strides.isel(speed=k)
@@ -138,6 +158,7 @@ def recordings(
                 part,
                 int(ticks[whole, column].min()),
                 timestep,
+                _torque_before(of_speed["tick_torque"], part, history)[whole],
                 lean,
                 imu_noise,
                 rng,
@@ -147,6 +168,26 @@ def recordings(
     if not by_speed:
         raise InvalidInput(f"no speed has {FEWEST} whole strides at its end; explain a longer run")
     return by_speed
+
+
+def _torque_before(torque: xr.DataArray, part: str, count: int) -> Array:
+    """The last torques before a part of each stride of one speed, shape (last, count, 12).
+
+    Before a stance they are those of the flight of the stride before. Where that was not recorded,
+    as with the first stride, the next stride's stand in.
+    """
+    other = PARTS[1 - PARTS.index(part)]
+    values = torque.sel(part=other).transpose("last", "tick", "joint").to_numpy().astype(float)
+    before = np.full((len(values), count, values.shape[-1]), np.nan)
+    for row, of_stride in enumerate(values):
+        known = of_stride[np.isfinite(of_stride).all(axis=-1)][-count:]
+        before[row, count - len(known) :] = known
+    if part == PARTS[0]:
+        before[1:], before[0] = before[:-1].copy(), np.nan
+    rows = range(len(before) - 1)
+    for row, neighbour in [*((k, k + 1) for k in rows[::-1]), *((k + 1, k) for k in rows)]:
+        before[row] = np.where(np.isnan(before[row]), before[neighbour], before[row])
+    return np.asarray(np.nan_to_num(before))
 
 
 def _lean(strides: xr.Dataset) -> Array:
@@ -164,6 +205,7 @@ def _recording(
     part: str,
     ticks: int,
     timestep: float,
+    before: Array,
     lean: Array,
     imu_noise: float,
     rng: np.random.Generator | None,
@@ -182,6 +224,7 @@ def _recording(
         joints=values("joints", "joint"),
         rates=values("joint_rates", "joint"),
         torque=values("torque", "joint"),
+        before=before,
         feedforward=values("feedforward", "joint"),
         base=values("base", "axis"),
         base_rate=base_rate,

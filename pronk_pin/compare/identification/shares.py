@@ -26,7 +26,7 @@ from ...control import phase_grid
 from ...gait import Gait
 from ...inverse_dynamics import PLANAR_CONSTRAINT, feedforward
 from ...robot import NB, Robot
-from .equations import PhaseForces, settled_ticks, windowed
+from .equations import PhaseForces, explained_forces, settled_ticks, windowed
 from .model_terms import Term
 from .recording import PARTS
 
@@ -73,7 +73,7 @@ def shares(
             at = (k, PARTS.index(part))
             planned = gait.phase(part).duration
             on_ticks = _model_on_ticks(phase, getattr(reference, part), planned)
-            parts = _apart(phase, on_ticks, value, terms, causes)
+            parts = _apart(robot, phase, on_ticks, value, terms, causes)
             learned[at], model[at], spread[at], feedback[at], *causes_on_grid = (
                 _on_grid(phase, values, planned) for values in parts
             )
@@ -110,6 +110,7 @@ def _model_on_ticks(phase: PhaseForces, model: Array, planned: float) -> Array:
 
 
 def _apart(
+    robot: Robot,
     phase: PhaseForces,
     model: Array,
     value: Array,
@@ -120,10 +121,8 @@ def _apart(
     recording = phase.recording
     commanded = recording.torque[:, :-1].mean(axis=0)
     ahead = recording.feedforward[:, :-1].mean(axis=0)
-    residual, columns = phase.known.mean(axis=0), phase.columns.mean(axis=0) * value
-    needed = -residual
-    needed[:, NB:] += commanded  # rnea of the URDF
-    columns = np.moveaxis(columns, -1, 0)  # (terms, ticks, 18)
+    needed = phase.needed.mean(axis=0)
+    columns = np.moveaxis(explained_forces(robot, phase, terms, value), -1, 0)  # (terms, ticks, 18)
     lean = phase.lean
     if phase.balance is None:
         moving, internal = commanded, np.zeros_like(commanded)

@@ -11,10 +11,14 @@ from .metrics import (
     VARIABLES,
     CellSummary,
     by_joint,
+    family,
     feedback_share,
+    in_family,
     join_summaries,
     peak_history,
     reduction,
+    robots,
+    sampled,
     settling_stride,
     steady,
     strides_to_converge,
@@ -22,7 +26,6 @@ from .metrics import (
     summarize_cell,
 )
 from .paper_table import table_1
-from .robots import family, in_family, robots, sampled
 from .statistics import (
     CONFIDENCE,
     LEAST_UNITS,

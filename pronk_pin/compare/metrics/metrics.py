@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ..._checks import instance_of, known_name
 from ..._typing import Array, BoolArray, IntArray
@@ -24,6 +26,13 @@ TRANSIENT = 10
 """First strides of learning that are a transient, and no steady state; of a short learning the
 first half."""
 
+_WINDOW = 10
+"""Strides of the means by which learning is said to grow."""
+
+GROWTH, GROWN = 1.5, 0.005
+"""Learning is diverging where its errors end so many times, and so many radians, above the least
+that they have been."""
+
 SETTLED = 0.1
 """Learning has settled where this share of the improvement, or less, is still missing."""
 
@@ -37,6 +46,8 @@ VARIABLES = ("count", "start", "peak_error", "learning", "upright")
 KEYS = ["robot", "base", "scenario", "speed", "controller", "seed", "joint", "metric"]
 COLUMNS = [*KEYS, "value", "unit"]
 """Columns of the summary; rows are sorted by the keys."""
+
+_SAMPLED = re.compile(r"random-(\d+)-\d+")
 
 
 def steady(strides: xr.Dataset) -> xr.Dataset:
@@ -96,6 +107,9 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
     Per robot:
         strides_of_learning: Strides that were made with the learning law on; where there are some.
         skipped_*: How many of them taught nothing, by the reasons of `control.SKIPPED`.
+        error_growth: Mean peak of the last `_WINDOW` strides of learning over the least mean of so
+            many, thigh or calf, whichever grew more; 1 where it never was smaller.
+        diverging: 1 where the error grew by more than `GROWTH` and by `GROWN` rad, else 0.
         upright: 1 if it never fell; NaN, as all the others, if it finished no stride.
         speed_error, apex_error: Steady mean minus the gait's [m/s], [m].
         apex_deviation: Standard deviation of the apex over the steady strides [m].
@@ -143,6 +157,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
             ),
             *(("-", name, values[k], unit) for name, (values, unit) in spent.items()),
             *_settling(per_joint["peak_error"][k, :count], learning),
+            *_growth(per_joint["peak_error"][k, :count][learning]),
             *(_lessons(skipped[k, :count][learning]) if skipped is not None else ()),
         ]
         rows += [
@@ -184,6 +199,17 @@ def _settling(peaks: Array, learning: BoolArray) -> Iterator[_Row]:
         counts = [_converged(peaks[:, j], learning) for j in range(1, len(JOINTS))]
         for joint, count in zip((*JOINTS[1:], "-"), (*counts, np.max(counts)), strict=True):
             yield joint, "strides_to_converge", float(count), "1"
+
+
+def _growth(peaks: Array) -> Iterator[_Row]:
+    """How far the errors of one robot came up again while it learned, from its peaks (n, 3)."""
+    if len(peaks) < 2 * _WINDOW:
+        return
+    means = sliding_window_view(peaks[:, 1:], _WINDOW, axis=0).mean(axis=-1)  # thigh, calf
+    last, least = means[-1], means.min(axis=0)
+    grown = (last > GROWTH * least) & (last - least > GROWN)
+    yield "-", "error_growth", float(np.max(last / least)), "1"
+    yield "-", "diverging", float(grown.any()), "1"
 
 
 def _lessons(reasons: Array) -> Iterator[_Row]:
@@ -299,3 +325,51 @@ def reduction(summary: pd.DataFrame, metric: str) -> pd.DataFrame:
     others["value"] = 1.0 - others["value"].to_numpy() / against
     others["unit"] = "1"
     return others
+
+
+def family(scenario: str) -> str:
+    """What a scenario is a sample of: "random-3" for "random-3-0"; itself if it is not sampled."""
+    return _SAMPLED.sub(r"random-\1", scenario)
+
+
+def sampled(scenario: str) -> bool:
+    """Whether a world, or what `family` says of it, is a sample."""
+    return re.match(r"random-\d", scenario) is not None
+
+
+def in_family(summary: pd.DataFrame, scenario: str) -> pd.DataFrame:
+    """The rows of a world, or of a family of sampled ones."""
+    members = [name for name in summary["scenario"].unique() if family(name) == scenario]
+    return summary[summary["scenario"].isin(members)]
+
+
+def robots(
+    summary: pd.DataFrame,
+    *,
+    scenario: str,
+    controller: str,
+    metric: str = "peak_error",
+    joint: str = "calf",
+) -> pd.DataFrame:
+    """A metric of each robot: a row a unit (scenario and seed), a column a speed.
+
+    Args:
+        summary: See `compare.metrics`.
+        scenario: A scenario or a family of sampled ones.
+        controller: Whose.
+        metric: Which metric.
+        joint: Which joint, "-" for a metric of the robot.
+
+    Returns:
+        Values, NaN where the robot fell (but for the metric `upright` itself).
+    """
+    rows = in_family(summary[summary["controller"] == controller], scenario)
+    values = _pivot(rows[(rows["metric"] == metric) & (rows["joint"] == joint)])
+    if metric == "upright":
+        return values
+    upright = _pivot(rows[rows["metric"] == "upright"]).reindex_like(values)
+    return values.where(upright != 0.0)
+
+
+def _pivot(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows.set_index(["scenario", "seed", "speed"])["value"].unstack("speed")

@@ -23,7 +23,7 @@ import pandas as pd
 from scipy import stats
 
 from ..._typing import Array
-from .robots import robots
+from .metrics import robots
 
 CONFIDENCE = 0.95
 """Level of every interval."""

@@ -4,24 +4,19 @@ Comes in: a summary, or `Results`.
 Goes out: tables and text for a terminal and for the report.
 """
 
+from .cells import against_model, beat_text, between, number, units_of_intervals
 from .difference import format_changes
 from .limitations import limitations
 from .overview import ControllerOverview, JointOverview, Overview, answer, overview
-from .tables import SHOWN, SHOWN_PARAMETERS, beside_the_paper, sampled_scenarios
-from .verdict import (
-    against_model,
-    answer_in_words,
-    beat_text,
-    beside_note,
-    between,
-    families,
-    format_suite,
-    format_summary,
-    format_tables,
-    number,
-    units_of_intervals,
-    verdict,
+from .tables import (
+    SHOWN,
+    SHOWN_PARAMETERS,
+    beside_the_paper,
+    paper_learner,
+    sampled_scenarios,
 )
+from .terminal import beside_note, format_suite, format_summary, format_tables
+from .verdict import answer_in_words, families, verdict
 
 __all__ = [
     "SHOWN",
@@ -44,6 +39,7 @@ __all__ = [
     "limitations",
     "number",
     "overview",
+    "paper_learner",
     "sampled_scenarios",
     "units_of_intervals",
     "verdict",

@@ -11,8 +11,8 @@ from scipy import stats
 from ...errors import InvalidInput
 from ..metrics import LEAST_UNITS, Interval, compare_pairs, family, robots
 from ..results import Results
+from .cells import between, number
 from .tables import SHOWN
-from .verdict import between, number
 
 LEVEL = 0.05
 """Share of false alarms among the changes that are named."""

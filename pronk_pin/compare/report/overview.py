@@ -83,6 +83,7 @@ class ControllerOverview:
         apex_error: Mean magnitude [m].
         upright: Robots that stayed up.
         fell: Robots that did not.
+        diverging: Robots whose errors grew again while they learned, see `compare.metrics`.
         robots: How many there were, with those that finished no stride, of which neither is known.
         unit: What the intervals are drawn over, see `compare.metrics.statistics`.
     """
@@ -99,6 +100,7 @@ class ControllerOverview:
     apex_error: float
     upright: int
     fell: int
+    diverging: int
     robots: int
     unit: str
 
@@ -160,6 +162,7 @@ def _reached(
         apex_error=_mean(np.abs(values("apex_error"))),
         upright=int((upright == 1.0).sum()),
         fell=int((upright == 0.0).sum()),
+        diverging=int(np.nansum(values("diverging"))),
         robots=len(upright),
         unit=unit_of(table("upright")),
     )

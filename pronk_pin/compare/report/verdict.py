@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-import itertools
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from ..metrics import CONFIDENCE, LEARNER, Interval, control_arm, family, in_family
+from ..metrics import (
+    CONFIDENCE,
+    LEARNER,
+    Interval,
+    compare_controllers,
+    control_arm,
+    family,
+    in_family,
+    sampled,
+)
+from .cells import number
 from .inconclusive import inconclusive, unsaid
-from .overview import MOVING, ControllerOverview, Overview, answer, overview
-from .tables import SHOWN, beside_the_paper, sampled_scenarios, worst_reduction
-
-_WIDTH = 100
+from .overview import ControllerOverview, Overview, answer, overview
+from .tables import (
+    SHOWN,
+    sampled_scenarios,
+    worst_reduction,
+)
 
 
 def verdict(summary: pd.DataFrame, *, scenario: str, table: Overview | None = None) -> str:
@@ -33,7 +43,7 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: Overview | None = No
     if reason := inconclusive(summary, scenario=scenario, table=table, against="pd"):
         return _joined(f"Nothing is concluded: {reason}.", _fallen(table), _control_arm(summary))
     learning = table[LEARNER]
-    if learning.unit == "scenario":
+    if sampled(scenario):
         return _sampled_verdict(summary, scenario, table)
     less, speeds = _less(learning), in_family(summary, scenario)["speed"].nunique()
     worst = worst_reduction(summary, scenario=scenario, controller=LEARNER)
@@ -55,7 +65,8 @@ def verdict(summary: pd.DataFrame, *, scenario: str, table: Overview | None = No
         sentences.append(reason)
     elif "model" in table:
         sentences.append(_against_the_model(learning, table["model"]))
-    return _joined(*sentences, _fallen(table), _control_arm(summary))
+    sentences += _with_the_rotors(summary, scenario, table)
+    return _joined(*sentences, _growing(table), _fallen(table), _control_arm(summary))
 
 
 def _less(learning: ControllerOverview) -> str:
@@ -146,6 +157,44 @@ def _against_the_model(learning: ControllerOverview, model: ControllerOverview) 
     return text
 
 
+def _with_the_rotors(summary: pd.DataFrame, scenario: str, table: Overview) -> Iterator[str]:
+    """Practice against the model that knows the rotors, on the URDF's gait and on the model's."""
+    rival, said = "model+rotors", {True: "beats", None: "cannot be told from", False: "loses to"}
+    for learner, what in ((LEARNER, "Practice"), ("ilc+rotors", "On that model's gaits practice")):
+        if not {learner, rival} <= set(table):
+            continue
+        found = {
+            joint: compare_controllers(
+                summary, scenario=scenario, controller=learner, against=rival, joint=joint
+            )
+            for joint in SHOWN
+        }
+        parts = [
+            f"{said[found[joint].better]} it in the {joint} "
+            f"({number(table[learner].joints[joint].peak.value, '.4f')} against "
+            f"{number(table[rival].joints[joint].peak.value, '.4f')} rad)"
+            for joint in SHOWN
+            if found[joint].pairs
+        ]
+        if parts and what == "Practice":
+            yield (
+                "Against the model that knows the rotors, with gaits planned for them: practice "
+                f"{' and '.join(parts)}."
+            )
+        elif parts:
+            yield f"{what} {' and '.join(parts)}."
+
+
+def _growing(table: Overview) -> str:
+    """Whose errors grow while they learn; empty where nobody's do."""
+    found = [f"{row.diverging} under {name}" for name, row in table.items() if row.diverging]
+    return (
+        f"Robots whose errors grow again as they learn (diverging): {', '.join(found)}."
+        if (found)
+        else ""
+    )
+
+
 def _fallen(table: Overview) -> str:
     fallen, robots = sum(row.fell for row in table.values()), sum(r.robots for r in table.values())
     idle = robots - fallen - sum(row.upright for row in table.values())
@@ -194,7 +243,9 @@ def suite_verdict(summary: pd.DataFrame, *, tables: Mapping[str, Overview] | Non
         f"In {world} nothing is concluded: {reason}." for world, reason in reasons.items() if reason
     ]
     sentences += _range_against_pd(told)
-    return _joined(*sentences, _where_robots_fell(tables), _control_arm(summary))
+    growing = {scenario: _growing(table) for scenario, table in tables.items()}
+    grown = [f"In {scenario}: {text}" for scenario, text in growing.items() if text]
+    return _joined(*sentences, *grown, _where_robots_fell(tables), _control_arm(summary))
 
 
 def _where_it_beats_the_model(learning: Overview) -> Iterator[str]:
@@ -259,136 +310,6 @@ def answer_in_words(summary: pd.DataFrame, *, tables: Mapping[str, Overview] | N
         ((scenario, table),) = tables.items()
         said = verdict(summary, scenario=scenario, table=table)
     return said or _joined(unsaid(tables), _where_robots_fell(tables))
-
-
-def format_summary(summary: pd.DataFrame) -> str:
-    """Tables and verdict as text for a terminal: `format_tables` of one scenario, `format_suite` of
-    many."""
-    worlds = families(list(summary["scenario"].unique()))
-    return format_suite(summary) if len(worlds) > 1 else format_tables(summary, scenario=worlds[0])
-
-
-def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
-    """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
-    tables = answer(in_family(summary, scenario))
-    single = bool((summary["scenario"] == scenario).any())
-    mine = tables[scenario]
-    parts = [
-        _format_beside(beside_the_paper(summary, scenario=scenario)) if single else "",
-        beside_note(mine) if single else "",
-        format_overview(mine),
-        textwrap.fill(answer_in_words(in_family(summary, scenario), tables=tables), _WIDTH),
-    ]
-    return "\n\n".join(part for part in parts if part)
-
-
-def beside_note(table: Overview) -> str:
-    """Who is missing beside the paper's Table I, from an `overview`; empty if nobody is."""
-    mine = [table[name] for name in ("pd", LEARNER) if name in table]
-    robots, missing = sum(row.robots for row in mine), sum(row.robots - row.upright for row in mine)
-    if not missing:
-        return ""
-    if missing == robots:
-        return "Nothing stands beside the paper's Table I: no robot stayed up."
-    return (
-        f"Beside the paper's Table I are the robots that stayed up: {missing} of {robots} did not."
-    )
-
-
-def format_suite(summary: pd.DataFrame) -> str:
-    """The overviews of all scenarios and the verdict over them, as text for a terminal."""
-    tables = answer(summary)
-    parts = [f"{scenario}\n{format_overview(table)}" for scenario, table in tables.items()]
-    return "\n\n".join([*parts, textwrap.fill(answer_in_words(summary, tables=tables), _WIDTH)])
-
-
-def _format_beside(table: pd.DataFrame) -> str:
-    if table.empty:
-        return ""
-    lines = [
-        " " * 8 + "".join(f"{f'{joint}: peak stance error [rad]':^44}" for joint in SHOWN),
-        f"{'speed':>6}  " + f"{'this run':^22}{'paper, Table I':^22}" * len(SHOWN),
-        f"{'[m/s]':>6}" + f"{'PD':>8}{'ILC':>7}{'less':>7}" * 2 * len(SHOWN),
-    ]
-    for speed, row in table.iterrows():
-        cells = ""
-        for joint, source in itertools.product(SHOWN, ("ours", "paper")):
-            pd_, ilc, less = (
-                row.get((joint, source, name), np.nan) for name in ("PD", "ILC", "reduction")
-            )
-            cells += f"{number(pd_, '.3f'):>8}{number(ilc, '.3f'):>7}{number(less, '.0%'):>7}"
-        lines.append(f"{speed if isinstance(speed, str) else f'{speed:.2g}':>6}{cells}")
-    return "\n".join(line.rstrip() for line in lines)
-
-
-def format_overview(table: Overview) -> str:
-    """An `overview` as text: peaks with their intervals, and against the model."""
-    wide = max(10, *map(len, table))
-    lines = [
-        f"{'':>{wide}}  {'calf: peak error [rad]':^27} {'thigh: peak error [rad]':^27}"
-        "  beats model  strides to  feedb.  cost of  stayed",
-        f"{'controller':>{wide}}  "
-        + f"{'mean':>6} {'95 % interval':>13} {'felt':>6} " * 2
-        + f" {'calf/thigh':>11}  {'beat it':>10}  {'share':>6}  {'transp.':>7}  upright",
-    ]
-    for name, row in table.items():
-        cells = " ".join(
-            f"{number(own.peak.value, '.4f'):>6} {between(own.peak, '.4f', '-'):>13} "
-            f"{number(own.felt, '.4f'):>6}"
-            for own in (row.joints[joint] for joint in SHOWN)
-        )
-        lines.append(
-            f"{name:>{wide}}  {cells}  {against_model(row):>11}  {beat_text(row):>10}  "
-            f"{number(row.feedback, '.0%'):>6}  {number(row.cost, '.2f'):>7}  "
-            f"{row.upright} of {row.robots}"
-        )
-    if units := units_of_intervals(table):
-        lines.append(f"{'':>{wide}}  intervals over the {units}")
-    lines.append(
-        f"{'':>{wide}}  peaks from the true contact on; felt: from when the controller felt it; "
-        f"cost from {MOVING:g} m/s on"
-    )
-    return "\n".join(lines)
-
-
-def units_of_intervals(table: Overview) -> str:
-    """What the intervals of an `overview` are drawn over, in words; empty where there are none."""
-    units = {row.unit for row in table.values() if any(j.peak.known for j in row.joints.values())}
-    return " and ".join(f"{unit}s" for unit in sorted(units))
-
-
-def against_model(row: ControllerOverview) -> str:
-    """Whether calf and thigh are better than with the model's feedforward: yes, no, or open.
-
-    A dash where no robot stayed up under both, and of learning that nothing taught.
-    """
-    joints = [row.joints[joint] for joint in SHOWN]
-    if row.taught == 0 or not all(joint.pairs for joint in joints):
-        return "-"
-    return "/".join({True: "yes", None: "open", False: "no"}[joint.better] for joint in joints)
-
-
-def beat_text(row: ControllerOverview) -> str:
-    """Strides until the model is beaten, and by how many robots; "never" where by none."""
-    beat = row.beat
-    if not beat.learners or row.taught == 0:
-        return "-"
-    if not beat.robots:
-        return "never"
-    few = "" if beat.robots == beat.learners else f" ({beat.robots}/{beat.learners})"
-    return f"{beat.strides:.0f}{few}"
-
-
-def between(interval: Interval, form: str, word: str = " to ") -> str:
-    """An interval, as "0.0210 to 0.0232"; a dash without one."""
-    if not interval.known:
-        return "-"
-    return f"{interval.low:{form}}{word}{interval.high:{form}}"
-
-
-def number(value: float, form: str) -> str:
-    """A number, or a dash where there is none."""
-    return format(value, form) if np.isfinite(value) else "-"
 
 
 def _percent(share: Interval) -> str:

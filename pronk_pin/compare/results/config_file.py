@@ -14,7 +14,7 @@ from .remedies import MAKE_ONE
 CONFIG = "config.json"
 """Its name."""
 
-SCHEMA = 4
+SCHEMA = 5
 """Version of the layout of a results folder."""
 
 

@@ -18,9 +18,9 @@ from tqdm import tqdm
 from ..._typing import Array
 from ...control import load_controller
 from ...errors import InvalidInput
-from ...gait import load_library
+from ...gait import load_library, replan
 from ..experiment import initial_feedforward
-from ..identification import Explanation, identified_gaits
+from ..identification import Explanation
 from ..metrics import by_joint
 from ..simulation import Schedule, simulate
 from ..world import Scenario, load_scenario
@@ -73,11 +73,7 @@ def close_loop(
     scenarios_ = _scenarios(strides, scenarios)
     library = load_library(explanation.robot.name)
     gaits = [library.at(speed) for speed in speeds]
-    again = (
-        identified_gaits(explanation.identified, gaits)
-        if "identified+gait" in controllers
-        else gaits
-    )
+    again = replan(explanation.identified, gaits) if "identified+gait" in controllers else gaits
     rows = []
     with tqdm(
         total=len(scenarios_) * len(controllers),
@@ -89,7 +85,7 @@ def close_loop(
         for scenario in scenarios_:
             for name in controllers:
                 spec = load_controller(name)
-                played = again if spec.identified_gaits else gaits
+                played = again if spec.gait_model == "identified" else gaits
                 identified = spec.source == "identified"
                 model = explanation.identified if identified else explanation.robot
                 simulated = simulate(

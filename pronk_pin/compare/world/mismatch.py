@@ -6,14 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ...robot import ROTOR
 from .sensors import Sensors
-
-# Rotor inertia of Unitree's motor about its own axis; ref: links *_rotor of go1.urdf in
-# example-robot-data (the A1 has the same motor, and its URDF leaves the rotors out).
-ROTOR_INERTIA = 0.000111842
-GEAR_RATIO = 9.0  # paper, section II.A
-ROTOR = ROTOR_INERTIA * GEAR_RATIO**2
-"""Rotor inertia as the joint feels it [kg m^2]."""
 
 NOISE = Sensors(
     encoder_noise=0.0005,

@@ -30,8 +30,9 @@ from ..._checks import (
 )
 from ..._checks import seed as known_seed
 from ...errors import InvalidInput, UnknownName
+from ...robot import ROTOR
 from ...storage import from_text
-from .mismatch import KNOWN, NOISE, ROTOR
+from .mismatch import KNOWN, NOISE
 from .sensors import Sensors
 
 Vector: TypeAlias = tuple[float, float, float]

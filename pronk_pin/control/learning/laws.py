@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from ..._checks import SHARE, Interval, instance_of, keep_reals, shown
-from ..._typing import Array, BoolArray, IntArray
+from ..._typing import Array, IntArray
 from ...errors import InvalidInput
 from ...gait import Gait
 from ..signals import (
@@ -44,16 +44,30 @@ class LawContext(ControlContext):
     """What a learning law may be bound to.
 
     Attributes:
-        lifted_model: Linearises the strides of a gait under the controller; takes a second.
+        part: Part of the stride that the law learns, one of `PARTS`.
+        lifted_model: Linearises the stances of a gait under the controller; takes a second.
     """
 
+    part: str
     lifted_model: Callable[[Gait], LiftedModel]
 
 
 def bound(law: LearningLaw | None, context: LawContext) -> LearningLaw | None:
-    """A law bound to the robots that it learns for, if it has a method `bind`."""
+    """A law bound to the robots that it learns for, if it has a method `bind`.
+
+    Raises:
+        InvalidInput: It cannot learn there, or its `bind` returns no law.
+    """
     bind = getattr(law, "bind", None)
-    return law if bind is None else known_law(f"{context.controller}: bound law", bind(context))
+    if bind is None:
+        return law
+    ready = bind(context)
+    if ready is None:  # which would be a controller that does not learn
+        raise InvalidInput(
+            f"the law {type(law).__name__} of controller '{context.controller}' returned nothing "
+            "from bind(context); let it return the law to use, such as itself"
+        )
+    return known_law(f"{context.controller}: bound law", ready)
 
 
 SKIPPED = (
@@ -99,10 +113,6 @@ class StrideSelection:
             np.isnan(duration),
         ]
         return np.asarray(np.select(checks, range(1, len(checks) + 1), default=0), dtype=np.intp)
-
-    def usable(self, record: StrideRecord) -> BoolArray:
-        """Whether strides may be learned from, shape (n,)."""
-        return np.asarray(self.skipped(record) == 0)
 
 
 def delivered(record: StrideRecord) -> StrideRecord:
@@ -193,6 +203,9 @@ def learned_by(law: LearningLaw, record: StrideRecord, controller: str) -> Array
     return answer
 
 
+_Filtered = TypeVar("_Filtered", bound="FilteredLaw")
+
+
 class FilteredLaw:
     """A law with a learning filter, which is looked at when the law is bound.
 
@@ -202,7 +215,7 @@ class FilteredLaw:
 
     filter: ZeroPhaseFilter
 
-    def bind(self, context: LawContext) -> Self:
+    def bind(self: _Filtered, context: LawContext) -> _Filtered:
         """The law itself; warns with `LeakyFilter` if constant torques do not pass its filter."""
         if isinstance(self.filter, ZeroPhaseFilter):  # it may be any function
             self.filter.warn()
@@ -221,7 +234,8 @@ class PDTypeILC(FilteredLaw):
     Attributes:
         gain: Learning gain; 0 to 1.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase; what the feedforward does takes a while to show in the error.
+        delta: Look-ahead, as a part of the phase s from 0 to 1: how much later the error is read,
+            since what a feedforward does takes a while to show in it.
         gains: Weights of the error and its rate: eq. (10).
         filter: The learning filter Q.
     """
@@ -252,7 +266,7 @@ class PaperILC(FilteredLaw):
     is 2; only the filter's leak keeps the law from diverging.
 
     Attributes:
-        delta: Look-ahead in phase.
+        delta: Look-ahead, as a part of the phase s from 0 to 1, into the error.
         gains: Feedforward gains, in the paper equal to the feedback gains.
         filter: Zero-phase filter over recorded torques and errors.
     """
@@ -284,7 +298,7 @@ class CurrentIterationILC(FilteredLaw):
     Attributes:
         gain: Part of the feedback torque that is taken over; 1 in the textbook.
         leak: Part of the memory that is forgotten in each stride.
-        delta: Look-ahead in phase.
+        delta: Look-ahead, as a part of the phase s from 0 to 1, into the feedback.
         filter: The learning filter Q.
     """
 

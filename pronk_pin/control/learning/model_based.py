@@ -89,12 +89,18 @@ class ModelBasedILC:
         """Bind the law to the models of a controller's robots.
 
         Raises:
-            InvalidInput: The trunks may turn, which the models do not know.
+            InvalidInput: The trunks may turn, or the law is to learn the flight: the models know
+                neither.
         """
         if context.base != "locked":
             raise InvalidInput(
                 f"controller '{context.controller}' has a law with a model that counts on a level "
                 "trunk; use another controller, or base 'locked'"
+            )
+        if context.part != "stance":
+            raise InvalidInput(
+                f"controller '{context.controller}' has a law with a model of the stance as that "
+                f"of the {context.part}; use another one, such as PDTypeILC(), or None"
             )
         return self.with_models([context.lifted_model(gait) for gait in context.gaits])
 

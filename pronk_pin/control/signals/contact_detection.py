@@ -21,8 +21,6 @@ class StanceContact(NamedTuple):
 
     gap: IntArray
     """Ticks of the longest time without contact, shape (n,)."""
-    touchdowns: IntArray
-    """Contacts one after the other: 2 where the robot bounced once, shape (n,)."""
     share: Array
     """Share of the stance in which there was contact, shape (n,)."""
 
@@ -128,13 +126,12 @@ class ContactDetector:
         return np.asarray((latest >= 0) & (state == 1))
 
     def stance(self, load: Array, length: IntArray) -> StanceContact:
-        """Count contacts and gaps of stances of so many ticks (n,), from their loads (n, ticks)."""
+        """Measure contact and gaps of stances of so many ticks (n,) by their loads (n, ticks)."""
         ticks = np.arange(load.shape[1])
         contact = self.contact(load) & (ticks < length[:, None])
-        begins = contact & ~np.hstack([np.zeros((len(load), 1), dtype=bool), contact[:, :-1]])
         last = np.maximum.accumulate(np.where(contact, ticks, -1), axis=1)  # tick of contact
         gap = np.where(ticks < length[:, None], ticks - last, 0).max(axis=1)
-        return StanceContact(gap, begins.sum(axis=1), contact.sum(axis=1) / length)
+        return StanceContact(gap, contact.sum(axis=1) / length)
 
     def false_touchdown(self, stance: StanceContact, length: IntArray) -> BoolArray:
         """Whether stances began without ground contact: their touchdown was false, shape (n,)."""

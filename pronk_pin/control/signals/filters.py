@@ -58,7 +58,7 @@ class ZeroPhaseFilter:
                 f"{change} {abs(1.0 - self.dc_gain):.0%} of a constant torque in each stride; use "
                 "coefficients that are not rounded, as ZeroPhaseFilter.butterworth gives them",
                 LeakyFilter,
-                stacklevel=3,
+                stacklevel=5,  # who makes a controller: beyond `bind`, `bound` and `Controller`
             )
 
     @classmethod
@@ -101,7 +101,7 @@ def first_order(values: Array, start: Array, *, time_constant: float, timestep: 
 
 
 def look_ahead(values: Array, delta: float, onward: Array | None = None) -> Array:
-    """Read values (n, samples, ...) on the phase grid at s + delta.
+    """Read values (n, samples, ...) on the phase grid at s + delta, the look-ahead from 0 to 1.
 
     Beyond the end `onward` (n, m, ...) goes on on the same spacing; then the last one is held.
     """

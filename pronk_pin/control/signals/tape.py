@@ -95,8 +95,12 @@ class Tape:
         if ticks <= self.ticks:
             return self
         index = np.minimum(np.arange(ticks), self.ticks - 1)
-        names = ("feedforward", "position", "velocity")
-        return replace(self, **{name: getattr(self, name)[:, index] for name in names})
+        return replace(
+            self,
+            feedforward=self.feedforward[:, index],
+            position=self.position[:, index],
+            velocity=self.velocity[:, index],
+        )
 
     def setpoint(self, gains: Gains) -> Array:
         """Set points of servos with these gains: the torque at q = v = 0 [N m], (n, ticks, 12)."""

@@ -175,15 +175,14 @@ def fold(robot: Robot, contact: Contact = "rolling", base: Base = "locked") -> F
 def _of_motors(robot: Robot, legs: tuple[str, ...], forces: ca.SX, v: ca.SX) -> ca.SX:
     """Replace the joint torques among the forces by the commanded motor torques.
 
-    `Robot.motor_torques` in CasADi: friction added, over the torque constant.
+    The inverse of `Robot.joint_torques` in CasADi: friction added, over the torque constant.
     """
-    n = len(legs) * len(JOINTS)
-    damping, coulomb = (
-        np.tile(getattr(robot.parameters, name), len(legs)) for name in ("damping", "coulomb")
-    )
+    n, parameters = len(legs) * len(JOINTS), robot.parameters
+    damping = np.tile(parameters.damping, len(legs))
+    coulomb = np.tile(parameters.coulomb, len(legs))
     rates = v[-n:]
     friction = ca.DM(damping) * rates + ca.DM(coulomb) * ca.tanh(rates / SLIDING)
-    torques = (forces[-n:] + friction) / robot.parameters.torque_constant
+    torques = (forces[-n:] + friction) / parameters.torque_constant
     return ca.vertcat(forces[:-n], torques)
 
 

@@ -5,7 +5,7 @@ Goes out: its MuJoCo specification, and files: MJCF and URDF.
 """
 
 from .mjcf_file import check_mjcf, compile_mjcf, loading, read_mjcf
-from .model_files import parametrised_spec, write_mjcf, write_urdf
+from .model_files import write_mjcf, write_urdf
 from .urdf import body_inertia, mujoco_spec, set_body_inertia
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "compile_mjcf",
     "loading",
     "mujoco_spec",
-    "parametrised_spec",
     "read_mjcf",
     "set_body_inertia",
     "write_mjcf",

@@ -6,6 +6,7 @@ Goes out: figures, or files of them.
 
 from .explanation_figure import write_explanation_figure
 from .gait_figures import write_gait_figures
+from .knowledge_figure import knowledge_ladder, shows_knowledge
 from .learning_figures import errors_by_seed, learning_curves, predicted_and_measured
 from .skill_figures import gains_figure, transfers_figure
 from .suite_figures import by_scenario, heat_map, peak_curves
@@ -26,10 +27,12 @@ __all__ = [
     "errors_by_speed",
     "gains_figure",
     "heat_map",
+    "knowledge_ladder",
     "learned_minus_model",
     "learning_curves",
     "peak_curves",
     "predicted_and_measured",
+    "shows_knowledge",
     "torque_library",
     "torque_surface",
     "tracking",

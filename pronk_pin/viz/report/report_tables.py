@@ -17,6 +17,7 @@ from ...compare.report import (
     between,
     number,
 )
+from ...control import CONTROLLERS
 from ...parity import Parity, Row, format_value, merged
 from ..figure_style import in_order
 from ..figures import LABELS
@@ -116,7 +117,8 @@ def motion(table: Overview) -> pd.DataFrame:
     """What else is to be known of the controllers in a world."""
     rows = {}
     for name, row in table.items():
-        cells: dict[str, str] = {}
+        known = CONTROLLERS[name].knows if name in CONTROLLERS else ()
+        cells: dict[str, str] = {"knows": ", ".join(known) or "nothing"}
         for joint in SHOWN:
             cells[f"{joint}: felt peak [rad]"] = number(row.joints[joint].felt, ".4f")
             cells[f"{joint}: RMS [rad]"] = number(row.joints[joint].rms, ".4f")

@@ -49,8 +49,8 @@ def test_what_the_library_replays_is_learned_before() -> None:
 def test_each_cell_has_a_file_name_of_its_own() -> None:
     experiment = Experiment(scenarios=("nominal", "payload"), seeds=(0, 1))
     names = [cell.name for cell in experiment.cells()]
-    assert len(names) == len(set(names)) == 5 * 2 * 2
-    assert "model+ilc_payload_1" in names
+    assert len(names) == len(set(names)) == len(DEFAULT_CONTROLLERS) * 2 * 2
+    assert "ilc+rotors_payload_1" in names
 
 
 def test_scenarios_are_known_by_one_spelling() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -25,21 +26,30 @@ from pronk_pin.compare import (
     Simulation,
     describe,
     explain,
+    load_scenario,
     random_scenarios,
     run_experiment,
 )
 from pronk_pin.compare.identification import TERMS, Term, explained, foreign, remarks
-from pronk_pin.compare.identification.equations import equations, ground_free, phase_forces
+from pronk_pin.compare.identification.equations import (
+    DelayedEquations,
+    equations,
+    ground_free,
+    phase_forces,
+)
 from pronk_pin.compare.identification.estimate import estimate
-from pronk_pin.compare.identification.model_terms import Motion, parameters, truth
-from pronk_pin.compare.identification.recording import recordings
+from pronk_pin.compare.identification.model_terms import Motion, parameters
+from pronk_pin.compare.identification.recording import PhaseRecording, recordings
 from pronk_pin.compare.identification.shares import discrepancy
+from pronk_pin.compare.identification.truth import true_parameters, truth
 from pronk_pin.compare.simulation.dataset import to_dataset
 from pronk_pin.compare.studies.identified_models import close_loop, format_loop
+from pronk_pin.compare.world import mjcf_sha256
 from pronk_pin.control import load_controller
 from pronk_pin.dynamics import contact_jacobian
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import load_library
+from pronk_pin.robot.formats.urdf import mujoco_spec
 from pronk_pin.viz.figures.explanation_figure import write_explanation_figure
 
 COMBINED = Scenario(
@@ -110,8 +120,13 @@ def found(learned_strides: xr.Dataset) -> Explanation:
 
 
 def true_values(scenario: Scenario) -> Array:
-    by_name = truth(scenario)
+    by_name = truth(load_robot("a1"), scenario)
     return np.array([by_name[term.name] for term in TERMS])
+
+
+def rows_of(robot: Robot, phases: tuple[PhaseRecording, ...]) -> DelayedEquations:
+    forces = tuple(phase_forces(robot, phase, TERMS) for phase in phases)
+    return equations(robot, forces, TERMS)
 
 
 def random_motion(robot: Robot, n: int) -> Motion:
@@ -122,8 +137,7 @@ def random_motion(robot: Robot, n: int) -> Motion:
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
     v, a = rng.standard_normal((2, n, 18))
     v[:, 6:] = np.sign(v[:, 6:]) * (3.0 + np.abs(v[:, 6:]))
-    tau, rate = rng.standard_normal((2, n, 12))
-    return Motion(q, v, a, v[:, 6:], np.sign(v[:, 6:]), tau, rate)
+    return Motion(q, v, a, v[:, 6:], np.sign(v[:, 6:]), rng.standard_normal((n, 12)))
 
 
 _OF_JOINTS = [term for term in TERMS if term.cause not in ("load", "delay")]
@@ -191,7 +205,7 @@ def test_with_the_true_parameters_nothing_is_left_of_mujocos_motion(
 ) -> None:
     true = true_values(COMBINED)
     for phases in recordings(learned_strides).values():
-        rows = equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
+        rows = rows_of(robot, phases).at(true)
         rest = rows.y - rows.A @ true
         for group, most in ((0, 0.05), (1, 0.05), (3, 0.005), (4, 0.005)):
             mine = rows.group == group
@@ -207,7 +221,7 @@ def test_a_torque_stamped_a_tick_late_spoils_everything(
     late["tick_torque"] = learned_strides["tick_torque"].shift(tick=1).fillna(0.0)
     for strides in (learned_strides, late):
         phases = next(iter(recordings(strides).values()))
-        rows = equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
+        rows = rows_of(robot, phases).at(true)
         mine = rows.group == 4
         rest.append(np.sqrt(np.mean((rows.y - rows.A @ true)[:, mine] ** 2)))
     assert rest[1] > 3.0 * rest[0]
@@ -255,13 +269,129 @@ def test_a_single_cause_is_read_and_no_other(scenario: Scenario, most: Mapping[s
     assert (table["estimate"].abs() / scale)[quiet].max() < 0.1
 
 
+LATE = dataclasses.replace(COMBINED, name="late", delay=0.004)
+
+
+@pytest.fixture(scope="module")
+def late_strides() -> xr.Dataset:
+    return simulate_learning(LATE)
+
+
+def test_a_delay_is_a_shift_and_not_taken_for_load_or_damping(late_strides: xr.Dataset) -> None:
+    found = explain_noisy(late_strides)
+    table = found.table()
+    for name in ("delay", "payload", "thigh damping", "calf damping"):
+        assert table.loc[name, "estimate"] == pytest.approx(table.loc[name, "true"], rel=0.05), name
+    assert table.loc["delay", "low"] < 0.004 < table.loc["delay", "high"]
+    assert not foreign(found)
+
+
+def test_late_motors_without_load_are_not_read_as_load() -> None:
+    strides = simulate_learning(load_scenario("delay"))
+    exact, noisy = explain(strides).table(), explain_noisy(strides).table()
+    assert exact.loc["delay", "estimate"] == pytest.approx(0.004, abs=2e-5)
+    assert exact.loc["payload", "estimate"] == pytest.approx(0.0, abs=0.03)
+    assert noisy.loc["payload", "estimate"] == pytest.approx(0.0, abs=0.15)
+
+
+def test_the_delays_share_is_what_was_told_and_not_played_yet(late_strides: xr.Dataset) -> None:
+    found = explain(late_strides)
+    whole = found.shares["learned"] - found.shares["model"]
+    total = found.shares["torque"].sum("cause", skipna=False)
+    np.testing.assert_allclose(total, whole, atol=1e-9)
+    assert float(explained(found.shares).min()) > 0.99
+    flight = found.shares.sel(part="flight")
+    told = flight["learned"].isel(speed=0).transpose("phase", "joint").to_numpy()
+    late = flight["torque"].sel(cause="delay").isel(speed=0).transpose("phase", "joint").to_numpy()
+    ticks = flight["phase"].to_numpy() * float(flight["duration"].isel(speed=0)) / LATE.timestep
+    before = np.stack([np.interp(ticks - 4.0, ticks, column) for column in told.T], axis=-1)
+    seen = np.isfinite(told).all(axis=1) & np.isfinite(before).all(axis=1)
+    assert seen.sum() > 10
+    assert np.abs((late - (told - before))[seen]).max() < 0.05 * np.abs(late[seen]).max()
+
+
+def test_with_the_true_delay_nothing_is_left_of_mujocos_motion(
+    robot: Robot, late_strides: xr.Dataset
+) -> None:
+    true, early = true_values(LATE), true_values(LATE)
+    early[[term.name for term in TERMS].index("delay")] = 0.0
+    for phases in recordings(late_strides).values():
+        rows = rows_of(robot, phases)
+        rest, spoilt = ((at.y - at.A @ value) for value in (true, early) for at in [rows.at(value)])
+        for group, most in ((0, 0.05), (3, 1e-6), (4, 1e-6)):  # along z knees stick in landing
+            mine = rows.group == group
+            assert np.median(np.abs(rest[:, mine])) < most
+            assert np.median(np.abs(spoilt[:, mine])) > 10.0 * most
+
+
+def foreign_mjcf(robot: Robot, path: Path) -> Path:
+    """The robot with rotors, friction, and a heavier trunk that bears a box in front."""
+    spec = mujoco_spec(robot)
+    for name in robot.joint_names:
+        joint = spec.joint(name)
+        knee = name.endswith("calf_joint")
+        joint.armature, joint.frictionloss = 0.02 if knee else 0.01, 0.25
+        joint.damping = [0.7, *joint.damping[1:]]
+    trunk = spec.body(robot.spec.base_link)
+    trunk.mass += 1.0
+    spec.compile()
+    root = ElementTree.fromstring(spec.to_xml())
+    body = next(each for each in root.iter("body") if each.get("name") == robot.spec.base_link)
+    box = ElementTree.SubElement(body, "body", name="box", pos="0.1 0 0.05")
+    ElementTree.SubElement(box, "inertial", pos="0 0 0", mass="0.5", diaginertia="1e-3 1e-3 1e-3")
+    path.write_text(ElementTree.tostring(root, encoding="unicode"))
+    return path
+
+
+def test_the_truth_of_an_mjcf_is_its_own(robot: Robot, tmp_path: Path) -> None:
+    path = foreign_mjcf(robot, tmp_path / "robot.xml")
+    scenario = load_scenario("nominal+payload=2+delay=0.003", mjcf=str(path))
+    true = truth(robot, scenario)
+    rotor = SCENARIOS["nominal"].armature
+    for joint, armature in (("hip", 0.01), ("thigh", 0.01), ("calf", 0.02)):
+        assert true[f"{joint} armature"] == pytest.approx(armature + rotor)
+        assert true[f"{joint} damping"] == pytest.approx(0.7 + 0.1)
+        assert true[f"{joint} Coulomb"] == pytest.approx(0.25 + 0.2)
+    assert true["payload"] == pytest.approx(1.0 + 0.5 + 2.0)
+    x, _, z = robot.model.inertias[1].lever
+    assert true["trunk moment x"] == pytest.approx(1.0 * x + 0.5 * 0.1)
+    assert true["trunk moment z"] == pytest.approx(1.0 * z + 0.5 * 0.05 + 2.0 * 0.06)
+    assert true["delay"] == 0.003
+    assert true["weak motors"] == 0.0
+
+
+def test_an_mjcf_that_is_gone_or_changed_leaves_the_truth_of_the_motors(
+    robot: Robot, tmp_path: Path, learned_strides: xr.Dataset
+) -> None:
+    path = foreign_mjcf(robot, tmp_path / "robot.xml")
+    scenario = dataclasses.replace(COMBINED, mjcf=str(path))
+    strides = learned_strides.assign_attrs(
+        scenario_parameters=scenario.to_json(), mjcf_sha256=mjcf_sha256(path)
+    )
+    assert true_parameters(robot, strides) == truth(robot, scenario)
+    path.write_text(path.read_text().replace("0.7", "0.8"))
+    motors = {"weak motors": pytest.approx(0.1), "delay": 0.0}
+    assert true_parameters(robot, strides) == motors
+    path.unlink()
+    assert true_parameters(robot, strides) == motors
+    assert true_parameters(robot, learned_strides.drop_attrs()) == {}
+    lines = describe(explain(strides, draws=2)).splitlines()
+    assert next(line for line in lines if line.startswith("payload")).split()[-2:] == ["-", "kg"]
+
+
+def test_a_shifted_centre_of_mass_is_a_moment_of_the_trunk(robot: Robot) -> None:
+    true = truth(robot, load_scenario("com-shift=0.02"))
+    assert true["payload"] == 0.0
+    assert true["trunk moment x"] == pytest.approx(0.02 * robot.model.inertias[1].mass)
+
+
 def test_other_strides_as_instruments_take_the_noise_bias_away(
     robot: Robot, learned_strides: xr.Dataset
 ) -> None:
     rng = np.random.default_rng(5)
     loud = with_noise(with_noise(learned_strides, rng), rng)
     rows = {
-        speed: equations(robot, tuple(phase_forces(robot, phase, TERMS) for phase in phases))
+        speed: rows_of(robot, phases)
         for speed, phases in recordings(loud, imu_noise=IMU, rng=rng).items()
     }
     true = true_values(COMBINED)
@@ -433,7 +563,7 @@ def test_intervals_hold_the_truth_in_nine_of_ten_random_worlds() -> None:
     for seed in range(50):
         armature, damping, coulomb, payload = rng.uniform(0.0, [0.02, 0.4, 0.4, 3.0])
         world = Scenario(
-            f"random {seed}",
+            f"random-{seed}",
             armature=armature,
             damping=damping,
             coulomb=coulomb,
@@ -464,6 +594,31 @@ def test_intervals_hold_the_truth_in_sampled_worlds() -> None:
     assert inside.mean() >= 0.9
     by_term = inside.groupby(level="term").mean()
     assert by_term.min() >= 0.8, by_term
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noisy", [False, True], ids=["exact", "noisy"])
+def test_intervals_hold_the_truth_in_sampled_worlds_with_late_motors(noisy: bool) -> None:
+    """As `benchmarks/explanation_coverage.py` has it, with shorter runs."""
+    rng, tables = np.random.default_rng(12), []
+    for seed in range(50):
+        delay = 0.001 * (seed % 6)
+        world = load_scenario(f"random-0-{seed}" + (f"+delay={delay:g}" if delay else ""))
+        strides = simulate_learning(world, speeds=(-0.4, 0.0, 0.4, 0.8), seed=seed)
+        if noisy:
+            tables.append(explain(with_noise(strides, rng), imu_noise=IMU, rng=rng).table())
+        else:
+            tables.append(explain(strides).table())
+    table = pd.concat(tables)
+    table = table[table["seen"]]
+    inside = (table["low"] <= table["true"]) & (table["true"] <= table["high"])
+    assert inside.mean() >= 0.9
+    assert inside.groupby(level="term").mean().min() >= 0.85
+    error = (table["estimate"] - table["true"]).abs()
+    known = table["true"] != 0.0
+    near = (error <= 0.05 * table["true"].abs())[known].groupby(level="term").mean()
+    for name in ("payload", "delay", "thigh damping", "calf damping"):
+        assert near[name] >= (0.7 if noisy else 0.95), name
 
 
 _NOMINAL = SCENARIOS["nominal"]

@@ -25,7 +25,8 @@ from pronk_pin.compare.report.tables import (
     sampled_scenarios,
     worst_reduction,
 )
-from pronk_pin.compare.report.verdict import format_suite, format_tables, suite_verdict, verdict
+from pronk_pin.compare.report.terminal import format_suite, format_tables
+from pronk_pin.compare.report.verdict import suite_verdict, verdict
 from pronk_pin.compare.studies.gain_reduction import describe_gains
 from pronk_pin.compare.studies.learning_runs import mean_peaks
 from pronk_pin.compare.studies.reproduce import format_reproduction

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 
 from pronk_pin.compare import Results
-from pronk_pin.compare.report.verdict import format_suite, format_tables, suite_verdict, verdict
+from pronk_pin.compare.report.terminal import format_suite, format_tables
+from pronk_pin.compare.report.verdict import suite_verdict, verdict
 
 
 def test_the_verdict_says_in_words_what_the_numbers_say(eight: pd.DataFrame) -> None:

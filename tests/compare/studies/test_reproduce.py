@@ -58,7 +58,7 @@ def test_rows_stand_beside_the_papers_with_an_interval_over_the_seeds(
 ) -> None:
     rng = np.random.default_rng(0)
     parts = []
-    for seed in range(5):
+    for seed in range(8):
         part = summary.assign(seed=seed)
         part.loc[part["metric"] == "peak_error", "value"] *= rng.uniform(0.9, 1.1)
         parts.append(part)

@@ -36,12 +36,14 @@ def test_the_nearer_the_seed_to_what_is_learned_the_smaller_the_first_error(
 ) -> None:
     """The library never saw this speed, and the model knows neither rotors nor friction."""
     first = calf(table, 0)
-    assert first["library+ilc"] < 0.15 * first["model+ilc"] < 0.15 * first["ilc"]
+    # From the contact on, where the touchdown itself leaves a fifth of PD's error.
+    assert first["library+ilc"] < 0.3 * first["model+ilc"] < 0.3 * first["ilc"]
 
 
 def test_all_seeds_end_where_nothing_does(table: pd.DataFrame) -> None:
     end = table[table["stride"] > table["stride"].max() - 10].groupby("controller")["calf"].mean()
-    assert np.all(end < 0.15 * calf(table, 0)["ilc"])
+    assert np.all(end < 0.21 * calf(table, 0)["ilc"])
+    assert end.max() < 1.05 * end.min()
 
 
 def test_the_library_is_settled_before_the_others(table: pd.DataFrame) -> None:

@@ -146,7 +146,8 @@ def test_the_difference_is_the_learned_torque_less_the_models(results: Results) 
     for controller in ("ilc", "model"):
         strides = results.strides(results.find(controller=controller)).sel(speed=0.5)
         count, learned = int(strides["count"]), strides["learning"] == 1
-        last = min(30, int(learned.sum()) or count)
+        made = int(learned.sum())
+        last = min(30, max(made - 10, -(-made // 2)) or count)  # without the transient
         mine = strides["feedforward"].isel(stride=slice(count - last, count))
         torque[controller] = mine.sel(part="stance", joint="FL_calf").mean("stride").to_numpy()
     (curve,) = (line for line in figure.axes[0].lines if line.get_label() == "0.5")
