@@ -81,6 +81,7 @@ class Controller:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
         balance: The balance of a trunk that may turn; None where it is locked.
+        torque_control: What computes the torques at every tick; None where tapes and gains do.
         guard: The guard of the learning; None without one.
         skipped: Reason not to learn from the robots' last strides, index into `SKIPPED`,
             shape (n,).
@@ -122,6 +123,9 @@ class Controller:
         of_flight = replace(context, part="flight")
         self._laws = [bound(spec.law, context), bound(spec.flight_law, of_flight)]
         self.balance = spec.balance.bind(context)
+        self.torque_control = None
+        if spec.torque_law is not None:
+            self.torque_control = spec.torque_law.bind(context)
         self.guard = None
         if spec.guard is not None:
             self.guard = GuardState(spec.guard, Memory(self.feedforward, self._flight.duration))
@@ -164,7 +168,8 @@ class Controller:
         n = len(self.gaits)
         position = np.repeat(self._stance.position[:, :1], ticks, axis=1)
         zero = np.zeros_like(position)
-        return Tape(zero, position, zero, np.full(n, ticks, dtype=np.intp))
+        length = np.full(n, ticks, dtype=np.intp)
+        return Tape(zero, position, zero, length, acceleration=zero)
 
     def touchdown(
         self, rows: IntArray, learning: BoolArray | None = None, *, late: int | None = None
@@ -191,6 +196,7 @@ class Controller:
             velocity=reference.velocity[rows],
             length=reference.ticks[rows],
             begin=self.spec.touchdown_ticks if late is None else late,
+            acceleration=None if self.torque_control is None else reference.acceleration(rows),
         )
 
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
@@ -210,7 +216,19 @@ class Controller:
         position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
         velocity = reference.velocity[rows, ticks]
         velocity[..., 1::3] += rate[..., None]
-        tape = Tape(self._played(1, rows, ticks), position, velocity, reference.ticks[rows])
+        acceleration = None
+        if self.torque_control is not None:
+            acceleration = reference.acceleration(rows, ticks)
+            curvature = self.spec.regulator.profile_curvature(reference.phase[rows, ticks])
+            curvature *= turn / reference.duration[rows, None] ** 2
+            acceleration[..., 1::3] += curvature[..., None]
+        tape = Tape(
+            self._played(1, rows, ticks),
+            position,
+            velocity,
+            reference.ticks[rows],
+            acceleration=acceleration,
+        )
         return tape, record
 
     def landing(

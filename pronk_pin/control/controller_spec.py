@@ -14,6 +14,7 @@ from .._checks import (
     keep_reals,
     known_name,
     sequence_of,
+    shown,
     text,
     whole,
 )
@@ -31,6 +32,7 @@ from .learning import (
     known_law,
 )
 from .signals import ContactDetector, FlightTiming, Gains, ZeroPhaseFilter
+from .torque_control import ComputedTorque, TorqueLaw, WholeBodyQP
 
 SOURCES = ("none", "model", "library", "identified")
 """Sources of a controller's initial feedforward."""
@@ -67,6 +69,8 @@ class ControllerSpec:
         timing: Adaptation of the flight's duration to the measured one; None plays it as planned.
             Without a law, and where no duration is given, it adapts from the first stride on.
         gains: Feedback gains: eq. (9).
+        torque_law: Law that computes the torques at every tick, in place of the feedback gains and
+            the feedforward; None for these.
         regulator: Speed regulation: eq. (12).
         balance: Attitude and foot placement where the trunk is free to turn.
         selection: Strides worth learning from.
@@ -89,6 +93,7 @@ class ControllerSpec:
     guard: LearningGuard | None = None
     timing: FlightTiming | None = None
     gains: Gains = field(default_factory=Gains)
+    torque_law: TorqueLaw | None = None
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
     balance: BalanceSpec = field(default_factory=BalanceSpec)
     selection: StrideSelection = field(default_factory=StrideSelection)
@@ -115,6 +120,15 @@ class ControllerSpec:
         flag(f"{prefix}imu", self.imu)
         for name in ("law", "flight_law"):
             known_law(prefix + name, getattr(self, name))
+        if self.torque_law is not None and not callable(getattr(self.torque_law, "bind", None)):
+            raise InvalidInput(
+                f"{prefix}torque_law={shown(self.torque_law)} is no torque law; give an object "
+                "with bind(context), such as ComputedTorque(), or None"
+            )
+        if self.torque_law is not None and (self.source != "none" or any(self.laws)):
+            raise InvalidInput(
+                f"{prefix}a torque law plays no feedforward; leave out source, law and flight_law"
+            )
         if self.timing is not None:
             instance_of(f"{prefix}timing", self.timing, FlightTiming, "a FlightTiming, or None")
         if self.guard is not None:
@@ -153,6 +167,14 @@ _URDF, _IDENTIFIED = ("urdf",), ("urdf", "rotors", "friction", "load")
 
 _STIFF = Gains(kp=(140.0, 240.0, 360.0), kd=(2.0, 12.0, 4.0))
 """Four times the paper's stiffness and twice its damping."""
+
+_COMPUTED_TORQUE = ControllerSpec(
+    "computed-torque",
+    torque_law=ComputedTorque(),
+    timing=FlightTiming(),
+    knows=("urdf", "rotors", "foot forces"),
+)
+_WHOLE_BODY_QP = replace(_COMPUTED_TORQUE, name="whole-body-qp", torque_law=WholeBodyQP())
 
 CONTROLLERS = {
     spec.name: spec
@@ -204,6 +226,15 @@ CONTROLLERS = {
         replace(
             _ILC, name="ilc+rotors-stiff", gait_model="datasheet", gains=_STIFF, knows=("rotors",)
         ),
+        _COMPUTED_TORQUE,
+        _WHOLE_BODY_QP,
+        replace(
+            _COMPUTED_TORQUE,
+            name="computed-torque-cautious",
+            torque_law=ComputedTorque(omega=60.0),
+        ),
+        replace(_COMPUTED_TORQUE, name="computed-torque+rotors", gait_model="datasheet"),
+        replace(_WHOLE_BODY_QP, name="whole-body-qp+rotors", gait_model="datasheet"),
         ControllerSpec("ilc-norm-optimal", law=NormOptimalILC()),
     )
 }

@@ -126,6 +126,10 @@ class GaitPhase:
         rate = bezier.evaluate(self.joints, s, derivative=1)
         return position, rate / self.duration
 
+    def joint_acceleration(self, s: Array) -> Array:
+        """Joint accelerations [rad/s^2] at the phases s, shape (n, 12)."""
+        return bezier.evaluate(self.joints, _phases(s), derivative=2) / self.duration**2
+
     def base_reference(self, s: Array) -> tuple[Array, Array]:
         """Trunk x, z, pitch [m, m, rad] and their rates at the phases s, each of shape (n, 3)."""
         s = _phases(s)

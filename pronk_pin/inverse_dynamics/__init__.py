@@ -5,6 +5,7 @@ Goes out: motor torques, contact forces, and whether they are feasible.
 """
 
 from .distribution import distribute_wrench, wrench_matrix
+from .qp import cone_sides
 from .solve import (
     CONSTRAINT_COORDINATES,
     PLANAR_CONSTRAINT,
@@ -19,6 +20,7 @@ __all__ = [
     "PLANAR_CONSTRAINT",
     "Feedforward",
     "InverseDynamics",
+    "cone_sides",
     "distribute_wrench",
     "feedforward",
     "inverse_dynamics",

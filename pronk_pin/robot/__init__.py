@@ -16,7 +16,7 @@ from .conventions import (
     to_paper,
 )
 from .parameters import NOTHING, SLIDING, ModelParameters
-from .robot import NB, NL, Robot, load_robot
+from .robot import NB, NL, Robot, load_robot, with_rotors
 from .robot_spec import JOINTS, ROBOTS, ROTOR, RobotSpec
 from .state import (
     REFUSALS,
@@ -65,4 +65,5 @@ __all__ = [
     "sound_base",
     "to_mujoco",
     "to_paper",
+    "with_rotors",
 ]

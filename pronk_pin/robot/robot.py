@@ -25,7 +25,7 @@ from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
 from .robot_spec import JOINTS, ROBOTS, RobotSpec, check_names, locate, read_foot_radius
 from .urdf_file import read_urdf
 
-__all__ = ["JOINTS", "NB", "NL", "ROBOTS", "Robot", "RobotSpec", "load_robot"]
+__all__ = ["JOINTS", "NB", "NL", "ROBOTS", "Robot", "RobotSpec", "load_robot", "with_rotors"]
 
 NB, NL = 6, 12
 """Velocities of the floating base, and actuated joints of a robot with four legs of three."""
@@ -264,6 +264,20 @@ def load_robot(robot: str | RobotSpec = "a1") -> Robot:
         robot = ROBOTS[known_name("robot", robot, ROBOTS)]
     wanted = f"a RobotSpec, or a name, one of: {', '.join(ROBOTS)}"
     return _load(instance_of("robot", robot, RobotSpec, wanted))
+
+
+def with_rotors(robot: Robot) -> Robot:
+    """The robot with the rotors' inertia of its datasheet.
+
+    Raises:
+        InvalidInput: That is not known.
+    """
+    if not robot.spec.rotors:
+        raise InvalidInput(
+            f"the rotors of {robot.name} are not known; give RobotSpec(rotors=...) their inertia, "
+            "or choose controllers that do not need it, as 'pd', 'model' and 'ilc'"
+        )
+    return robot.with_parameters(ModelParameters(armature=robot.spec.rotors))
 
 
 @lru_cache(maxsize=16)

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from pronk_pin.compare.experiment.experiment import with_rotors
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import load_library, replan
-from pronk_pin.robot import ROTOR, load_robot
+from pronk_pin.robot import ROTOR, load_robot, with_rotors
 
 
 def test_gaits_are_planned_with_the_rotors_and_without_they_are_the_shipped_ones() -> None:

@@ -20,7 +20,7 @@ from ..._checks import instance_of, known_name, path, real, seed, sequence_of, t
 from ...control import load_controller
 from ...errors import InvalidInput
 from ...gait import SPEEDS, Gait, load_library, replan
-from ...robot import BASES, ROBOTS, ModelParameters, Robot, load_robot
+from ...robot import BASES, ROBOTS, load_robot, with_rotors
 from ..identification import explain
 from ..simulation import Progress, Schedule, simulate
 from ..world import load_scenario
@@ -265,20 +265,6 @@ def run_cell(
         attributes=_attributes(cell),
         progress=progress,
     )
-
-
-def with_rotors(robot: Robot) -> Robot:
-    """The robot with the rotors' inertia of its datasheet.
-
-    Raises:
-        InvalidInput: That is not known.
-    """
-    if not robot.spec.rotors:
-        raise InvalidInput(
-            f"the rotors of {robot.name} are not known; give RobotSpec(rotors=...) their inertia, "
-            "or choose controllers that do not need it, as 'pd', 'model' and 'ilc'"
-        )
-    return robot.with_parameters(ModelParameters(armature=robot.spec.rotors))
 
 
 def _gaits(robot: str, base: str, speeds: tuple[float, ...]) -> list[Gait]:

@@ -5,6 +5,7 @@
 | `ServoPlayback` | the law is affine in the joints' angles and velocities | a phase |
 | `DelayedPlayback` | it would be, but for motors that are late | as many ticks as they are late |
 | `FeedbackPlayback` | else: noise, a speed-torque curve, trunks that may turn | a tick |
+| `TorquePlayback` | a control computes the torques, not tape and gains | a tick |
 
 The first two make the same motion as the third, faster.
 """
@@ -17,11 +18,14 @@ import numpy as np
 
 from ..._typing import Array, IntArray
 from ...control import (
+    Aim,
     AttitudeEstimator,
     Balance,
     ControllerSpec,
     Gains,
+    Reading,
     Tape,
+    TorqueControl,
     TrunkEstimate,
     clip_torque,
 )
@@ -242,3 +246,59 @@ class FeedbackPlayback(Playback):
             return np.zeros_like(joints)
         position = segment.tape.position[:, 0]
         return balance.torque(segment.part, segment.rows, segment.tick, trunk[:2], joints, position)
+
+
+class TorquePlayback(Playback):
+    """A control computes the torques tick by tick, from joints and feet, a contact a tick late.
+
+    Args:
+        world: The robots.
+        motors: Theirs.
+        sensors: Theirs.
+        control: Computes the torques.
+        ticks: Length of the longest tape.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        motors: Motors,
+        sensors: SensorSuite,
+        control: TorqueControl,
+        *,
+        ticks: int,
+    ) -> None:
+        self._world, self._motors, self._sensors = world, motors, sensors
+        self._control = control
+        self.sensed = TickLog(world.n, ticks, turns=False)
+        self._load = np.zeros(world.force.shape[:2])  # as measured in the tick before
+
+    def next_stop(self, rows: IntArray, tick: int, part: int | None) -> int:
+        """See `Playback`."""
+        return tick + 1
+
+    def play(self, segment: Segment) -> Played:
+        """See `Playback`."""
+        rows, tick, tape, world = segment.rows, segment.tick, segment.tape, self._world
+        joints, rates = self._sensors.encoders(rows, world.joints[rows], world.joint_rates[rows])
+        reading = Reading(joints, rates, self._load[rows])
+        acceleration = np.zeros_like(joints)
+        if tape.acceleration is not None:
+            acceleration = tape.acceleration[:, 0]
+        aim = Aim(tape.position[:, 0], tape.velocity[:, 0], acceleration)
+        torque = self._control.torque(segment.part, rows, tick, aim, reading)
+        self.sensed.feedback[rows, tick] = torque
+        self.sensed.feedforward[rows, tick] = self.sensed.missing[rows, tick] = 0.0
+        torque = self._motors.drive(rows, torque, world.joint_rates[rows])
+        motion = world.play(rows, torque[:, None])
+        measured = motion._replace(
+            joints=joints[:, None],
+            joint_rates=rates[:, None],
+            force=self._sensors.feet(rows, motion.force),
+        )
+        self._load[rows] = measured.force[:, 0, :, 2]
+        self.sensed.write(rows, tick, measured)
+        return Played(motion, measured)
+
+    def advanced(self, segment: Segment, motion: Motion, ticks: IntArray) -> None:
+        """Nothing is left to do: motors were told their torques before."""

@@ -8,13 +8,27 @@ from dataclasses import replace
 import numpy as np
 
 from ..._typing import Array, BoolArray, IntArray
-from ...control import Balance, ControllerSpec, PhaseLog, Tape, TouchdownDetector
+from ...control import (
+    Balance,
+    ControllerSpec,
+    PhaseLog,
+    Tape,
+    TorqueControl,
+    TouchdownDetector,
+)
 from ...gait import Gait
 from ...robot import Robot
 from ..world import Motion, Motors, Scenario, SensorSuite, World, level_specific_force
 from .fall import FallDetector
 from .log import TickLog
-from .playback import DelayedPlayback, FeedbackPlayback, Playback, Segment, ServoPlayback
+from .playback import (
+    DelayedPlayback,
+    FeedbackPlayback,
+    Playback,
+    Segment,
+    ServoPlayback,
+    TorquePlayback,
+)
 
 
 class Player:
@@ -31,6 +45,7 @@ class Player:
         rng: Source of the sensors' noise.
         base: How the trunks may move, see `build_model`.
         balance: What keeps a trunk up that may turn; None where it is locked.
+        torque_control: What computes torques at every tick; None where tapes and gains do.
         chunked: Play many ticks at once where that is possible; the motion is the same.
 
     Attributes:
@@ -54,10 +69,12 @@ class Player:
         rng: np.random.Generator,
         base: str,
         balance: Balance | None,
+        torque_control: TorqueControl | None = None,
         chunked: bool,
     ) -> None:
         n, level = len(gaits), balance is None
         known = chunked and level and scenario.foreseeable  # torques, before they act
+        known &= torque_control is None
         servo = spec.gains if known and scenario.affine else None
         self.world = World(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
@@ -76,6 +93,10 @@ class Player:
             self._playback = ServoPlayback(self.world, servo, self.log, flight)
         elif known and scenario.delay_ticks:
             self._playback = DelayedPlayback(self.world, self.motors, spec.gains, self.log)
+        elif torque_control is not None:
+            self._playback = TorquePlayback(
+                self.world, self.motors, self.sensors, torque_control, ticks=ticks
+            )
         else:
             self._playback = FeedbackPlayback(
                 self.world, self.motors, self.sensors, spec, balance=balance, ticks=ticks
@@ -128,7 +149,8 @@ class Player:
             )
             played = np.maximum(played, 1 + self.late[rows])  # even if it broke before
         tau_max = self.world.robot.tau_max
-        sensed.torques(rows, tape, self._gains, tau_max, int(played.max()))
+        if not isinstance(playback, TorquePlayback):  # its torques do not follow from the tape
+            sensed.torques(rows, tape, self._gains, tau_max, int(played.max()))
         if sensed is not log:
             log.take_torques(rows, sensed)
         return played
@@ -195,4 +217,11 @@ class Player:
 def _excerpt(tape: Tape, rows: IntArray, ticks: slice) -> Tape:
     """Tapes of some of the robots at some of the ticks."""
     at = rows, ticks
-    return Tape(tape.feedforward[at], tape.position[at], tape.velocity[at], tape.length[rows])
+    acceleration = None if tape.acceleration is None else tape.acceleration[at]
+    return Tape(
+        tape.feedforward[at],
+        tape.position[at],
+        tape.velocity[at],
+        tape.length[rows],
+        acceleration=acceleration,
+    )

@@ -96,6 +96,7 @@ class Simulation:
             rng=rng.spawn(1)[0],
             base=base,
             balance=self.controller.balance,
+            torque_control=self.controller.torque_control,
             chunked=chunked,
         )
         self.world, self.upright = self.player.world, self.player.upright

@@ -43,3 +43,8 @@ class LegAngleRegulator:
         """Smooth step `x^2 (3 - 2 x)`, x = s / settled, of the change; and its derivative by s."""
         x = np.clip(s / self.settled, 0.0, 1.0)
         return x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / self.settled
+
+    def profile_curvature(self, s: Array) -> Array:
+        """Second derivative of `profile` by s; zero beyond the step."""
+        x = s / self.settled
+        return np.asarray(np.where(x < 1.0, 6.0 * (1.0 - 2.0 * x) / self.settled**2, 0.0))

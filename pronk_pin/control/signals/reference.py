@@ -99,6 +99,17 @@ class Reference:
             self.velocity[row, :end] = velocity * (part.duration / duration)
             self.velocity[row, end:] = 0.0
 
+    def acceleration(self, rows: IntArray, ticks: slice = slice(None)) -> Array:
+        """Joint accelerations of some robots [rad/s^2], shape (m, ticks, 12); zero where the phase
+        is held."""
+        phase = self.phase[rows, ticks]
+        acceleration = np.zeros_like(self.position[rows, ticks])
+        for own, row, s in zip(acceleration, rows, phase, strict=True):
+            own[:] = self.parts[row].joint_acceleration(s)
+            own *= (self.parts[row].duration / self.duration[row]) ** 2
+        acceleration[phase >= 1.0] = 0.0
+        return acceleration
+
     def ends(self, rows: IntArray) -> IntArray:
         """Ticks after which the references of some robots are constant, shape (m,)."""
         ends = np.ceil(self.duration[rows] / self.timestep).astype(np.intp) + 1

@@ -71,6 +71,8 @@ class Tape:
         length: Ticks after which each robot's phase ends at the latest, shape (n,): more than are
             on the tape, where the last of them is to be held, see `held`.
         begin: Tick at which to begin; those before have passed already.
+        acceleration: Reference joint accelerations [rad/s^2], shape (n, ticks, 12), for a control
+            that computes torques at every tick; None for others.
     """
 
     feedforward: Array
@@ -78,6 +80,7 @@ class Tape:
     velocity: Array
     length: IntArray
     begin: int = 0
+    acceleration: Array | None = None
 
     @property
     def ticks(self) -> int:
@@ -100,6 +103,7 @@ class Tape:
             feedforward=self.feedforward[:, index],
             position=self.position[:, index],
             velocity=self.velocity[:, index],
+            acceleration=None if self.acceleration is None else self.acceleration[:, index],
         )
 
     def setpoint(self, gains: Gains) -> Array:
