@@ -350,7 +350,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "spec's filter": (lambda: ControllerSpec("x", speed_filter=-1.0), "speed_filter=-1.0; give"),
     "ticks": (lambda: ControllerSpec("x", touchdown_ticks=0), "touchdown_ticks=0; give a whole n"),
-    "controller of nothing": (lambda: load_controller(any_value), "controller None is nothing;"),
+    "controller of nothing": (lambda: load_controller(any_value), "controller=None is nothing;"),
     "torque library": (
         lambda: TorqueLibrary(any_value, np.zeros(1), np.zeros(1), np.zeros(1)),
         "speeds is not an array of numbers",
@@ -489,7 +489,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "experiment of a robot": (
         lambda: experiment(robot=a1()),
-        "is a Robot; give a name, one of: a1",
+        "is a Robot; give a RobotSpec, or a name, one of: a1",
     ),
     "world of a number": (
         lambda: experiment(mjcf=3),
@@ -779,7 +779,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["parity", "nowhere.xml"], "nowhere.xml: missing; give the path of a URDF or an MJCF"),
     (["jump"], "Unrecognized options: jump; Available subcommands: compare, gaits, ilc, view,"),
     (["compare", "--speeeds", "3"], "Unrecognized options: --speeeds, 3; Perhaps you meant: --spe"),
-    ([], "Expected one of {compare, gaits, ilc, view, report, reproduce, explain, parity}"),
+    ([], "Expected one of {compare, gaits, ilc, view, report, reproduce, explain, parity, list}"),
 ]
 
 

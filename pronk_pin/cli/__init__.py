@@ -22,11 +22,12 @@ from tyro.conf import OmitSubcommandPrefixes, subcommand
 from .._checks import known_name
 from .._workers import handling
 from ..compare import Results
-from ..compare.experiment import SUITES, load_suite
+from ..compare.experiment import SUITES, load_suite, read_config
 from ..errors import LeakyFilter, OtherMachine, PronkError
 from .comparison import Compare, Explain, Report, Reproduce
 from .gaits import Gaits
 from .ilc import Ilc
+from .listing import List
 from .parity import Parity
 from .view import View
 
@@ -46,16 +47,23 @@ RENAMED: dict[str, str] = {
 
 
 def _commands(arguments: list[str]) -> Any:
-    """All commands; the defaults of `compare` are those of the suite that is asked for, or what is
-    in the results folder that it is to go on with."""
+    """All commands; the defaults of `compare` are those of the suite or of the file that is asked
+    for, or what is in the results folder that it is to go on with."""
     words = [word for argument in arguments for word in argument.split("=", 1)]
     following = dict(pairwise(words))
     suite = following.get("--suite", "default")
     known_name("suite", suite, SUITES)
     experiment = load_suite(suite)
     folder = Path(following.get("--folder", ""))
-    if words[:1] == ["compare"] and "--suite" not in words and (folder / "config.json").is_file():
+    if (
+        words[:1] == ["compare"]
+        and not {"--suite", "--config"} & set(words)
+        and (folder / "config.json").is_file()
+    ):
         experiment = replace(Results.load(folder).experiment, batches=())
+    config = following.get("--config") if words[:1] == ["compare"] else None
+    if config is not None:
+        experiment = read_config(config)
     default = Compare(experiment=experiment, suite=suite)
     return Union[  # noqa: UP007 -- its first member is made here
         Annotated[Compare, subcommand("compare", default=default)], Command
@@ -70,6 +78,7 @@ Command = (
     | Annotated[Reproduce, subcommand("reproduce")]
     | Annotated[Explain, subcommand("explain")]
     | Annotated[Parity, subcommand("parity")]
+    | Annotated[List, subcommand("list")]
 )
 
 

@@ -26,7 +26,6 @@ from ..compare.identification import DRAWS, IMU_NOISE, check_learner
 from ..compare.report import format_changes, format_summary
 from ..compare.studies import close_loop, format_loop, format_reproduction
 from ..errors import InvalidInput
-from ..robot import load_robot
 from ..robot.formats import write_mjcf, write_urdf
 from ..viz import known_figure, write_replay
 from ..viz.figures import write_explanation_figure
@@ -44,6 +43,8 @@ class Compare:
 
     experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
     """The experiment."""
+    config: Path | None = None
+    """Experiment in a YAML file, or the config.json of a result, which the other options change."""
     suite: str = "default"
     """A named experiment, which the other options change: default, mismatch, sampled, control,
     paper."""
@@ -61,7 +62,7 @@ class Compare:
         name = "comparison" if self.suite == "default" else self.suite
         folder, world = self.folder or default_folder(name), self.experiment.mjcf
         if world:
-            print(mjcf_parity(load_robot(self.experiment.robot), world).table())
+            print(mjcf_parity(self.experiment.model, world).table())
         results = run_experiment(
             self.experiment,
             folder,
@@ -69,7 +70,7 @@ class Compare:
             executor=self.executor,
             resimulate=self.resimulate,
         )
-        print(f"robot {results.experiment.robot}, base {results.experiment.base}\n")
+        print(f"robot {results.experiment.robot_name}, base {results.experiment.base}\n")
         print(format_summary(results.summary()))
         _write_pages(results)
 
@@ -93,7 +94,7 @@ class Reproduce:
         experiment = dataclasses.replace(load_suite("paper"), seeds=self.seeds)
         folder = self.folder or default_folder("paper")
         results = run_experiment(experiment, folder, workers=self.workers)
-        learners = tuple(name for name in experiment.controllers if name != "pd")
+        learners = tuple(name for name in experiment.controller_names if name != "pd")
         print(format_reproduction(results, learners=learners))
         print(f"\nresults  {results.folder}")
 
@@ -193,14 +194,20 @@ class Explain:
 
 
 def command_line(experiment: Experiment) -> str:
-    """The command that runs an experiment."""
+    """The command that runs an experiment; objects of one's own are read from its config.json."""
     for name in SUITES:
         if load_suite(name) == experiment:
             return f"pronk-pin compare --suite {name}"
-    words = ["pronk-pin compare", f"--robot {experiment.robot}"]
+    words = ["pronk-pin compare"]
+    own = (experiment.robot, experiment.gaits, *experiment.controllers, *experiment.scenarios)
+    if not all(isinstance(value, str) for value in own):
+        return "pronk-pin compare --config config.json"
+    words += [f"--robot {experiment.robot_name}"]
+    words += [f"--gaits {experiment.gaits}"] if experiment.gaits != "pronk" else []
+    words += [f"--apex {experiment.apex:g}"] if experiment.apex is not None else []
     words += ["--speeds " + " ".join(f"{speed:g}" for speed in experiment.speeds)]
-    words += ["--controllers " + " ".join(experiment.controllers)]
-    words += ["--scenarios " + " ".join(experiment.scenarios)]
+    words += ["--controllers " + " ".join(experiment.controller_names)]
+    words += ["--scenarios " + " ".join(experiment.scenario_names)]
     words += ["--seeds " + " ".join(map(str, experiment.seeds))]
     words += [f"--base {experiment.base}"]
     words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []

@@ -18,6 +18,7 @@ from .._checks import (
     text,
     whole,
 )
+from .._registry import find
 from ..errors import InvalidInput
 from .feedback import SPEED_FILTER, AttitudeFilter, BalanceSpec, LegAngleRegulator
 from .learning import (
@@ -241,10 +242,18 @@ CONTROLLERS = {
 """Controllers known by name."""
 
 
-def load_controller(name: str) -> ControllerSpec:
+def load_controller(name: str | ControllerSpec) -> ControllerSpec:
     """The controller of that name.
+
+    Args:
+        name: One of `CONTROLLERS`, the name of an entry point of the group `pronk_pin.controllers`,
+            or the address of a `ControllerSpec`, as in "my_package.wbc:controller"; one itself is
+            returned as it is.
 
     Raises:
         UnknownName: There is none.
+        InvalidInput: What the address names cannot be imported, or is something else.
     """
-    return CONTROLLERS[known_name("controller", name, CONTROLLERS)]
+    if isinstance(name, ControllerSpec):
+        return name
+    return find("controller", name, CONTROLLERS, ControllerSpec)

@@ -9,7 +9,7 @@ from .build import build_library
 from .checks import Audit, Check
 from .describe import describe_gait, describe_library
 from .gait import Gait, GaitPhase, Motion, known_gaits
-from .library import GaitLibrary, load_library
+from .library import GaitLibrary, load_library, shipped_libraries
 from .optimisation import GaitSolution, SolverState, optimize_gait, vertical_hop
 from .problem import BOUND, PRONK, ContactPhase, GaitProblem
 from .replan import replan
@@ -48,5 +48,6 @@ __all__ = [
     "number_range",
     "optimize_gait",
     "replan",
+    "shipped_libraries",
     "vertical_hop",
 ]

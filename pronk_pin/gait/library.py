@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from importlib import resources
@@ -33,7 +33,7 @@ _SAME = 1e-9
 """Speeds [m/s] or heights [m] closer than this are one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GaitLibrary:
     """Gaits of one robot, on a grid of speeds and apex heights.
 
@@ -82,6 +82,23 @@ class GaitLibrary:
         if np.isnan(self.apex):
             object.__setattr__(self, "apex", float(self.apexes[0]))
         _index(self.apexes, self.apex, "apex")
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other one moves the same robot in the same way."""
+        if not isinstance(other, GaitLibrary):
+            return NotImplemented
+        return (self.robot, self.sha256) == (other.robot, other.sha256)
+
+    def __hash__(self) -> int:
+        return hash((self.robot, self.sha256))
+
+    def __repr__(self) -> str:
+        n, speeds, apexes = len(self.gaits), self.speeds, self.apexes
+        heights = f"{apexes[0]:g}" if len(apexes) == 1 else f"{apexes[0]:g} to {apexes[-1]:g}"
+        return (
+            f"<GaitLibrary of {self.robot}, base {self.base}: {n} gaits, {speeds[0]:g} to "
+            f"{speeds[-1]:g} m/s, apex {heights} m>"
+        )
 
     @property
     def robot(self) -> str:
@@ -437,6 +454,13 @@ def load_library(
             f"build one with 'pronk-pin gaits build{options}', and look at it with --library",
         )
     return _shipped(name)
+
+
+def shipped_libraries() -> Iterator[GaitLibrary]:
+    """The gait libraries that are shipped."""
+    for file in (resources.files(__package__) / "data").iterdir():
+        if file.name.endswith(".npz"):
+            yield _shipped(file.name.removesuffix(".npz"))
 
 
 @lru_cache(maxsize=8)

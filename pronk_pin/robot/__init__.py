@@ -16,8 +16,16 @@ from .conventions import (
     to_paper,
 )
 from .parameters import NOTHING, SLIDING, ModelParameters
-from .robot import NB, NL, Robot, load_robot, with_rotors
-from .robot_spec import JOINTS, ROBOTS, ROTOR, RobotSpec
+from .robot import (
+    NB,
+    NL,
+    Robot,
+    load_robot,
+    recorded_robot,
+    robot_attributes,
+    with_rotors,
+)
+from .robot_spec import JOINTS, ROBOTS, ROTOR, RobotSpec, load_robot_spec
 from .state import (
     REFUSALS,
     as_array,
@@ -60,7 +68,10 @@ __all__ = [
     "joint_order",
     "leg_indices",
     "load_robot",
+    "load_robot_spec",
     "read_urdf",
+    "recorded_robot",
+    "robot_attributes",
     "rotation_matrix",
     "sound_base",
     "to_mujoco",

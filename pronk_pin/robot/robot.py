@@ -11,21 +11,44 @@ hip, thigh, calf.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field, replace
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from .._checks import instance_of, known_name, numbers
+from .._checks import instance_of, numbers
 from .._typing import Array, IntArray
 from ..errors import InvalidInput
+from ..storage import from_text
 from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
-from .robot_spec import JOINTS, ROBOTS, RobotSpec, check_names, locate, read_foot_radius
+from .robot_spec import (
+    JOINTS,
+    ROBOTS,
+    RobotSpec,
+    check_names,
+    load_robot_spec,
+    locate,
+    read_foot_radius,
+)
 from .urdf_file import read_urdf
 
-__all__ = ["JOINTS", "NB", "NL", "ROBOTS", "Robot", "RobotSpec", "load_robot", "with_rotors"]
+__all__ = [
+    "JOINTS",
+    "NB",
+    "NL",
+    "ROBOTS",
+    "Robot",
+    "RobotSpec",
+    "load_robot",
+    "recorded_robot",
+    "robot_attributes",
+    "with_rotors",
+]
 
 NB, NL = 6, 12
 """Velocities of the floating base, and actuated joints of a robot with four legs of three."""
@@ -253,17 +276,35 @@ def load_robot(robot: str | RobotSpec = "a1") -> Robot:
     """Load a robot by its short name, or from a specification of your own.
 
     Args:
-        robot: "a1", "go1", "go2" or "solo12", or a `RobotSpec`.
+        robot: What `load_robot_spec` takes.
 
     Raises:
         UnknownName: There is no robot of that name.
-        FileProblem: The URDF is missing or cannot be read.
+        FileProblem: The URDF, or a file of a specification, is missing or cannot be read.
         InvalidInput: The URDF lacks a joint or a foot that the specification names.
     """
-    if isinstance(robot, str):
-        robot = ROBOTS[known_name("robot", robot, ROBOTS)]
-    wanted = f"a RobotSpec, or a name, one of: {', '.join(ROBOTS)}"
-    return _load(instance_of("robot", robot, RobotSpec, wanted))
+    return _load(load_robot_spec(robot))
+
+
+def robot_attributes(spec: RobotSpec) -> dict[str, str]:
+    """Attributes by which a dataset names its robot: one that is not shipped is in them whole."""
+    own = {} if ROBOTS.get(spec.name) == spec else {"robot_spec": json.dumps(asdict(spec))}
+    return {"robot": spec.name, **own}
+
+
+def recorded_robot(attributes: Mapping[Any, Any]) -> Robot:
+    """The robot that the attributes of a dataset name, see `robot_attributes`.
+
+    Raises:
+        InvalidInput: A specification in them is damaged.
+        UnknownName: It is known by name only, and that is not known here.
+        FileProblem: Its URDF is missing.
+    """
+    stored = attributes.get("robot_spec")
+    if stored is None:
+        return load_robot(str(attributes["robot"]))
+    what = "a specification of a robot"
+    return load_robot(from_text(str(stored), RobotSpec, what, "make the strides again"))
 
 
 def with_rotors(robot: Robot) -> Robot:

@@ -11,8 +11,10 @@ from pathlib import Path
 import pinocchio as pin
 
 from .._checks import Interval, file_name, none_or, real, reals, sequence_of, text
+from .._checks import path as known_path
+from .._registry import find
 from ..errors import FileProblem, InvalidInput
-from ..storage import check_file
+from ..storage import as_type, check_file, read_toml
 
 JOINTS = ("hip", "thigh", "calf")
 """Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
@@ -84,6 +86,24 @@ class RobotSpec:
                 "joint of a leg, or none"
             )
 
+    @classmethod
+    def load(cls, path: Path | str) -> RobotSpec:
+        """Read a specification from a TOML file with the fields' names as keys.
+
+        A URDF that lies beside the file, or below its folder, is named relative to it.
+
+        Raises:
+            FileProblem: The file is missing, or is no such file.
+            InvalidInput: A value is out of range.
+        """
+        path = known_path("path", path).expanduser()
+        remedy = "correct it: its keys are the fields of RobotSpec, name and urdf at least"
+        document = read_toml(path, remedy)
+        urdf = document.get("urdf")
+        if isinstance(urdf, str) and (path.parent / urdf).is_file():
+            document["urdf"] = str((path.parent / urdf).resolve())
+        return as_type(document, cls, path, remedy, what="specification of a robot")
+
     def _check_patterns(self) -> None:
         for name in ("joint_pattern", "foot_pattern"):
             pattern = getattr(self, name)
@@ -139,6 +159,26 @@ ROBOTS = {
     )
 }
 """Robots known by name."""
+
+
+def load_robot_spec(robot: str | RobotSpec) -> RobotSpec:
+    """The specification of a robot.
+
+    Args:
+        robot: One of `ROBOTS`, the name of an entry point of the group `pronk_pin.robots`, the
+            address of a `RobotSpec`, module:object, or a TOML file, see `RobotSpec.load`; one
+            itself is returned as it is.
+
+    Raises:
+        UnknownName: There is no robot of that name.
+        FileProblem: There is no such file, or it is damaged.
+        InvalidInput: It is something else.
+    """
+    if isinstance(robot, RobotSpec):
+        return robot
+    if isinstance(robot, str | Path) and str(robot).endswith(".toml"):
+        return RobotSpec.load(robot)
+    return find("robot", robot, ROBOTS, RobotSpec)
 
 
 def check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:

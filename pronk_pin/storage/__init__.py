@@ -12,11 +12,13 @@ Goes out: files, and what they hold: text, documents, arrays; or a `FileProblem`
 """
 
 from .arrays import StoredArrays, read_arrays, write_arrays
-from .json_documents import (
+from .documents import (
     as_type,
     from_text,
     read_json,
     read_sealed,
+    read_toml,
+    read_yaml,
     sealed,
     sha256,
 )
@@ -51,7 +53,9 @@ __all__ = [
     "read_json",
     "read_sealed",
     "read_text",
+    "read_toml",
     "read_xml",
+    "read_yaml",
     "reading",
     "refuse_nan",
     "sealed",

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from .._typing import Array
 from ..errors import FileProblem
-from .json_documents import _T, as_type
+from .documents import _T, as_type
 from .reading import damaged, read_bytes, reading
 from .writing import write_file
 

@@ -26,7 +26,7 @@ def check_demand(experiment: Experiment, workers: int) -> None:
     Raises:
         InvalidInput: It does not, or does.
     """
-    gaits, cells = experiment.gaits, len(experiment.cells())
+    gaits, cells = experiment.planned, len(experiment.cells())
     duration = experiment.schedule.duration
     check_memory(gaits, duration, at_once=min(workers, cells))
     days = duration * len(gaits) * cells / _QUICK / workers / _DAY

@@ -23,7 +23,6 @@ from tqdm import tqdm
 
 from ..._checks import instance_of, path, worker_count
 from ..._workers import count_steps
-from ...control import load_controller
 from ...errors import FileProblem, WorkerLost
 from ..experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
 from ..metrics import CellSummary, join_summaries, summarize_cell
@@ -268,7 +267,7 @@ class _Run:
         if cell.depends_on is None:
             return None
         # Identification reads every tick; a library is made of a few variables.
-        explains = load_controller(cell.controller).source == "identified"
+        explains = cell.spec.source == "identified"
         return self.results.strides(cell.depends_on, None if explains else LIBRARY_VARIABLES)
 
     def _save(self, cell: Cell, finished: FinishedCell) -> None:

@@ -4,13 +4,16 @@ Comes in: robot, speeds, controllers, scenarios and seeds, or the name of a suit
 Goes out: an `Experiment`, its cells and their definition, and the strides of a cell.
 """
 
+from .cell import run_cell
 from .definition import Definition, cell_definition, define, differences, fingerprint
-from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
+from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment
+from .experiment_file import GAITS, from_document, read_config, to_document
 from .initial_feedforward import LIBRARY_VARIABLES, initial_feedforward, torque_library
 from .suites import SUITES, load_suite
 
 __all__ = [
     "DEFAULT_CONTROLLERS",
+    "GAITS",
     "LIBRARY_VARIABLES",
     "SUITES",
     "Cell",
@@ -20,8 +23,11 @@ __all__ = [
     "define",
     "differences",
     "fingerprint",
+    "from_document",
     "initial_feedforward",
     "load_suite",
+    "read_config",
     "run_cell",
+    "to_document",
     "torque_library",
 ]

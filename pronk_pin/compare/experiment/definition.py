@@ -7,27 +7,20 @@ can be compared with what is asked for, and what differs be named.
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
 import json
-from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, TypeAlias
 
-import numpy as np
-
-from ... import __name__ as _OURS
-from ...control import load_controller
-from ...robot import load_robot
+from ...robot import Robot
 from ...storage import sha256
-from ..world import load_scenario
 from ..world import mjcf_sha256 as mjcf_digest
+from .description import Description, describe
 
 if TYPE_CHECKING:
     from .experiment import Cell, Experiment
 
-Definition: TypeAlias = dict[str, Any]
-"""Nested dictionaries, lists, strings and numbers."""
+Definition: TypeAlias = Description
+"""Everything that the numbers of an experiment, or of a cell, depend on."""
 
 
 def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definition:
@@ -40,27 +33,28 @@ def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definit
     Raises:
         FileProblem: The experiment's MJCF cannot be read.
     """
-    cells = experiment.cells()
     if mjcf_sha256 is None:
         mjcf_sha256 = mjcf_digest(experiment.mjcf) if experiment.mjcf else ""
     return {
-        "robot": _robot(experiment.robot),
+        "robot": _robot(experiment.model),
         "base": experiment.base,
         "mjcf_sha256": mjcf_sha256,
         "schedule": describe(experiment.schedule),
         "gaits": {
             repr(speed): gait.sha256
-            for speed, gait in zip(experiment.speeds, experiment.gaits, strict=True)
+            for speed, gait in zip(experiment.speeds, experiment.planned, strict=True)
         },
         "controllers": {
-            name: describe(load_controller(name)) for name in sorted({c.controller for c in cells})
+            name: describe(experiment.controller(name))
+            for name in sorted({cell.controller for cell in experiment.cells()})
         },
-        "scenarios": {name: describe(load_scenario(name)) for name in experiment.scenarios},
+        "scenarios": {
+            name: describe(experiment.scenario(name)) for name in experiment.scenario_names
+        },
     }
 
 
-def _robot(name: str) -> Definition:
-    robot = load_robot(name)
+def _robot(robot: Robot) -> Definition:
     spec = describe(robot.spec)
     spec.pop("urdf")  # where it lies changes nothing; what it says does
     return {**spec, "urdf_sha256": robot.sha256}
@@ -87,39 +81,6 @@ def fingerprint(definition: Definition) -> str:
 def to_text(definition: Definition) -> str:
     """A definition in one line, the same each time."""
     return json.dumps(definition, sort_keys=True, separators=(",", ":"))
-
-
-def describe(value: object) -> Any:
-    """An object as JSON has it: class and fields, and the source of a class from outside."""
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, Mapping):
-        return {str(key): describe(part) for key, part in value.items()}
-    if isinstance(value, Iterable):
-        return [describe(part) for part in value]
-    if inspect.isroutine(value) or isinstance(value, type):
-        return _origin(value)
-    if dataclasses.is_dataclass(value):
-        fields = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-    else:
-        fields = dict(getattr(value, "__dict__", {}))
-    return {**_origin(type(value)), **{key: describe(part) for key, part in fields.items()}}
-
-
-def _origin(thing: Any) -> Definition:
-    """Where a class or function comes from; of one from outside, the SHA-256 of its module too."""
-    module, name = str(thing.__module__), str(thing.__qualname__)
-    if module.partition(".")[0] == _OURS:
-        return {"class": name}
-    try:
-        source = sha256(Path(inspect.getfile(thing)).read_bytes())
-    except (OSError, TypeError):
-        source = "unknown"  # typed in by hand, or compiled
-    return {"class": f"{module}:{name}", "source_sha256": source}
 
 
 def differences(before: object, now: object, *, most: int = 3) -> str:

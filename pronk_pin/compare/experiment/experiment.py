@@ -7,25 +7,33 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias, TypeVar
 
-import numpy as np
-import xarray as xr
 from tyro.conf import Suppress
+from tyro.constructors import PrimitiveConstructorSpec
 
-from ..._checks import instance_of, known_name, path, real, seed, sequence_of, text
-from ...control import load_controller
+from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
+from ...control import CONTROLLERS, ControllerSpec, load_controller
 from ...errors import InvalidInput
-from ...gait import SPEEDS, Gait, load_library, replan
-from ...robot import BASES, ROBOTS, load_robot, with_rotors
-from ..identification import explain
-from ..simulation import Progress, Schedule, simulate
-from ..world import load_scenario
-from .definition import cell_definition, define, fingerprint, to_text
-from .initial_feedforward import initial_feedforward, learned_strides
+from ...gait import SPEEDS, STYLES, Gait, GaitLibrary, load_library
+from ...robot import (
+    BASES,
+    ROBOTS,
+    Base,
+    Robot,
+    RobotSpec,
+    load_robot,
+    load_robot_spec,
+    with_rotors,
+)
+from ..simulation import Schedule
+from ..world import Scenario, load_scenario, shipped_scenario
+from .description import describe
+
+_T = TypeVar("_T")
 
 LEARNED = ("library", "identified")
 """Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
@@ -36,16 +44,54 @@ DEFAULT_CONTROLLERS = (
 )
 
 
+def _by_name(metavar: str) -> PrimitiveConstructorSpec[Any]:
+    """How the command line takes what is an object or a name: by its name."""
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=metavar,
+        instance_from_str=lambda words: words[0],
+        is_instance=lambda value: True,
+        str_from_instance=lambda value: [_name(value)],
+    )
+
+
+def _by_names(metavar: str) -> PrimitiveConstructorSpec[Any]:
+    """The same of several."""
+    return PrimitiveConstructorSpec(
+        nargs="*",
+        metavar=metavar,
+        instance_from_str=lambda words: tuple(words),
+        is_instance=lambda value: True,
+        str_from_instance=lambda values: [_name(value) for value in values],
+    )
+
+
+Controllers: TypeAlias = Annotated[
+    tuple[str | ControllerSpec, ...], _by_names("[NAME|MODULE:OBJECT [...]]")
+]
+Scenarios: TypeAlias = Annotated[
+    tuple[str | Scenario, ...], _by_names("[NAME|MODULE:OBJECT [...]]")
+]
+
+
 @dataclass(frozen=True)
 class Experiment:
     """A comparison of controllers; the same object in Python, on the command line and on disk.
 
+    Robot, gaits, controllers and scenarios are given by name, or as objects of one's own. What is
+    shipped is kept by name, whichever way it came.
+
     Attributes:
-        robot: Short name of the robot.
+        robot: Robot: one of `robot.ROBOTS`, or a `RobotSpec`.
+        gaits: Its gaits: "pronk", as shipped for it; or a `GaitLibrary`, or the file of one, as
+            `pronk-pin gaits build` writes it.
+        apex: Apex of the gaits [m], one that the library covers; by default the library's own.
         speeds: Desired speeds [m/s].
-        controllers: Short names of the controllers: any of `control.CONTROLLERS`.
-        scenarios: Names of the scenarios, composed with "+", values with "=": nominal, ideal,
-            payload=2+slope, random-0-3; see `compare.world.scenario`.
+        controllers: Controllers: any of `control.CONTROLLERS`, by name; a `ControllerSpec` of one's
+            own, or its address, module:object.
+        scenarios: Scenarios by name, composed with "+", values with "=": nominal, ideal,
+            payload=2+slope, random-0-3; or a `Scenario` of one's own, or its address; see
+            `compare.world.scenario`.
         seeds: Seeds of the scatter at the start.
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         mjcf: MJCF of the robot, with the same joint names, that stands in for its URDF in the
@@ -57,10 +103,12 @@ class Experiment:
             results folder; empty for all at once.
     """
 
-    robot: str = "a1"
+    robot: Annotated[str | RobotSpec, _by_name("NAME|FILE|MODULE:OBJECT")] = "a1"
+    gaits: Annotated[str | GaitLibrary, _by_name("NAME|FILE")] = "pronk"
+    apex: float | None = None
     speeds: tuple[float, ...] = SPEEDS
-    controllers: tuple[str, ...] = DEFAULT_CONTROLLERS
-    scenarios: tuple[str, ...] = ("nominal",)
+    controllers: Controllers = DEFAULT_CONTROLLERS
+    scenarios: Scenarios = ("nominal",)
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
     mjcf: str = ""
@@ -68,27 +116,85 @@ class Experiment:
     batches: Annotated[tuple[tuple[float, ...], ...], Suppress] = ()
 
     def __post_init__(self) -> None:
+        keep = object.__setattr__
         self._check_types()
-        names = tuple(load_scenario(name).name for name in self.scenarios)  # in one spelling
-        object.__setattr__(self, "scenarios", names)
-        for name in ("speeds", "controllers", "scenarios", "seeds"):
-            values = tuple(getattr(self, name))
-            object.__setattr__(self, name, values)  # a list would not equal what is read back
+        keep(self, "robot", _shortest("robot", load_robot_spec(self.robot), ROBOTS.get))
+        keep(self, "gaits", self._known_gaits())
+        specs = [load_controller(value) for value in self.controllers]
+        worlds = [load_scenario(value) for value in self.scenarios]
+        shortest = tuple(_shortest("controller", spec, CONTROLLERS.get) for spec in specs)
+        keep(self, "controllers", shortest)
+        keep(self, "scenarios", tuple(_shortest("scenario", w, shipped_scenario) for w in worlds))
+        named: dict[str, tuple[object, ...]] = {
+            "speeds": self.speeds,
+            "controllers": self.controller_names,
+            "scenarios": self.scenario_names,
+            "seeds": self.seeds,
+        }
+        for name, values in named.items():
             if len(values) == 0 or len(set(values)) != len(values):
                 raise InvalidInput(f"{name} must name at least one, and none of them twice")
-        _ = self.gaits  # there is one of each speed
-        for controller in self.controllers:
-            if load_controller(controller).gait_model == "datasheet":
-                _ = with_rotors(load_robot(self.robot))  # the datasheet is there
-            if load_controller(controller).source == "identified" and self.base != "locked":
+        self._check_controllers()
+        if self.mjcf:
+            keep(self, "mjcf", str(Path(self.mjcf).expanduser().resolve()))
+        keep(self, "speeds", tuple(sorted(self.speeds)))
+        _ = self.planned  # there is a gait of each speed
+        self._sort_batches()
+
+    def __hash__(self) -> int:
+        # Objects of one's own need not be hashable.
+        names = (self.robot_name, self.controller_names, self.scenario_names)
+        return hash((names, self.speeds, self.seeds, self.base, self.mjcf, self.schedule))
+
+    def _check_types(self) -> None:
+        known_name("base", self.base, BASES)
+        keep = object.__setattr__
+        for name, check, most in (
+            ("speeds", real, 1000),
+            ("controllers", lambda _, value: value, 1000),
+            ("scenarios", lambda _, value: value, 1000),
+            ("seeds", seed, 10_000),
+        ):
+            values: tuple[object, ...] = sequence_of(name, getattr(self, name), check, wanted=name)
+            if len(values) > most:
+                raise InvalidInput(f"{len(values)} {name}; give {most} or fewer")
+            keep(self, name, values)
+        keep(self, "apex", none_or(real, "apex", self.apex))
+        if not isinstance(self.mjcf, str) or self.mjcf:
+            keep(self, "mjcf", str(path("mjcf", self.mjcf)))
+        instance_of("schedule", self.schedule, Schedule)
+
+    def _known_gaits(self) -> str | GaitLibrary:
+        """The name of gaits that are shipped, or a library of this robot."""
+        gaits = self.gaits
+        if isinstance(gaits, str) and gaits in STYLES:
+            return gaits
+        if isinstance(gaits, str | Path):
+            if not str(gaits).endswith(".npz"):
+                listed = ", ".join(STYLES)
                 raise InvalidInput(
-                    f"controller '{controller}' identifies the robot on the locked base; leave it "
+                    f"gaits '{gaits}' are not known; give one of: {listed}; or a file of "
+                    "'pronk-pin gaits build', which ends in .npz"
+                )
+            return GaitLibrary.load(Path(gaits).expanduser(), robot=self.model)
+        wanted = f"a GaitLibrary, its file, or one of: {', '.join(STYLES)}"
+        library = instance_of("gaits", gaits, GaitLibrary, wanted)
+        if library.robot != self.robot_name:
+            raise InvalidInput(
+                f"these are gaits of {library.robot}, and the robot is {self.robot_name}; give the "
+                "robot's own"
+            )
+        return library
+
+    def _check_controllers(self) -> None:
+        for spec in map(load_controller, self.controllers):
+            if spec.gait_model == "datasheet":
+                _ = with_rotors(self.model)  # the datasheet is there
+            if spec.source == "identified" and self.base != "locked":
+                raise InvalidInput(
+                    f"controller '{spec.name}' identifies the robot on the locked base; leave it "
                     "out, or use base 'locked'"
                 )
-        if self.mjcf:
-            object.__setattr__(self, "mjcf", str(Path(self.mjcf).expanduser().resolve()))
-        object.__setattr__(self, "speeds", tuple(sorted(self.speeds)))
-        self._sort_batches()
 
     def _sort_batches(self) -> None:
         batches = tuple(tuple(sorted(batch)) for batch in self.batches)
@@ -98,9 +204,66 @@ class Experiment:
         object.__setattr__(self, "batches", batches if len(batches) > 1 else ())
 
     @property
-    def gaits(self) -> list[Gait]:
-        """The gait of each speed."""
-        return _gaits(self.robot, self.base, self.speeds)
+    def robot_name(self) -> str:
+        """Name of the robot."""
+        return _name(self.robot)
+
+    @property
+    def controller_names(self) -> tuple[str, ...]:
+        """Names of the controllers."""
+        return tuple(map(_name, self.controllers))
+
+    @property
+    def scenario_names(self) -> tuple[str, ...]:
+        """Names of the scenarios."""
+        return tuple(map(_name, self.scenarios))
+
+    def controller(self, name: str) -> ControllerSpec:
+        """The controller of a name: one of the experiment's, or a shipped one."""
+        return load_controller(_find(self.controllers, name))
+
+    def scenario(self, name: str) -> Scenario:
+        """The scenario of a name, in the experiment's MJCF if it has one."""
+        return load_scenario(_find(self.scenarios, name), mjcf=self.mjcf)
+
+    @property
+    def model(self) -> Robot:
+        """The robot, as its URDF has it."""
+        return load_robot(self.robot)
+
+    @property
+    def library(self) -> GaitLibrary:
+        """The gait library: of a trunk that may turn that of gaits that let it pitch.
+
+        Raises:
+            FileProblem: None is shipped for the robot.
+            InvalidInput: That of the experiment is for another base.
+        """
+        wanted: Base = "locked" if self.base == "locked" else "sagittal"
+        if isinstance(self.gaits, str):
+            base = None if wanted == "locked" else wanted
+            return load_library(self.robot_name, gait=self.gaits, base=base)
+        if self.gaits.base != wanted:
+            raise InvalidInput(
+                f"these gaits are planned for base '{self.gaits.base}', and base '{self.base}' "
+                f"needs those for '{wanted}'; build them with --base {wanted}, or choose another "
+                "base"
+            )
+        return self.gaits
+
+    @property
+    def planned(self) -> list[Gait]:
+        """The gait of each speed, as it is planned.
+
+        Raises:
+            SpeedOutOfRange, ApexOutOfRange: The library does not cover it.
+        """
+        return self.planned_at(self.speeds)
+
+    def planned_at(self, speeds: Sequence[float]) -> list[Gait]:
+        """The planned gaits of some speeds."""
+        library = self.library
+        return [library.at(speed, self.apex) for speed in speeds]
 
     def extended(self, other: Experiment) -> Experiment:
         """This experiment with the controllers, scenarios, speeds and seeds of another one, too.
@@ -115,85 +278,98 @@ class Experiment:
             for name, mine, theirs in _fixed(self, other)
             if mine != theirs
         ]
+        for kind in ("controllers", "scenarios"):
+            there, here = (
+                {_name(value): describe(value) for value in getattr(each, kind)}
+                for each in (self, other)
+            )
+            changed = [name for name in there if here.get(name, there[name]) != there[name]]
+            against += [f"'{name}' of the {kind} is another one there" for name in changed]
         if against:
             raise InvalidInput("; ".join(against))
         more: dict[str, Any] = {
             name: tuple(dict.fromkeys((*getattr(self, name), *getattr(other, name))))
-            for name in ("controllers", "scenarios", "seeds", "speeds")
+            for name in ("seeds", "speeds")
         }
+        for kind in ("controllers", "scenarios"):  # live objects in place of those on record
+            both = {_name(v): v for v in (*getattr(self, kind), *getattr(other, kind))}
+            more[kind] = tuple(both.values())
         added = tuple(speed for speed in other.speeds if speed not in self.speeds)
         batches = (*(self.batches or (self.speeds,)), added) if added else self.batches
         return dataclasses.replace(self, **more, batches=batches)
 
-    def _check_types(self) -> None:
-        known_name("robot", self.robot, ROBOTS)
-        known_name("base", self.base, BASES)
-        keep = object.__setattr__
-        for name, check, most in (
-            ("speeds", real, 1000),
-            ("controllers", text, 1000),
-            ("scenarios", text, 1000),
-            ("seeds", seed, 10_000),
-        ):
-            values: tuple[object, ...] = sequence_of(name, getattr(self, name), check, wanted=name)
-            if len(values) > most:
-                raise InvalidInput(f"{len(values)} {name}; give {most} or fewer")
-            keep(self, name, values)
-        if not isinstance(self.mjcf, str) or self.mjcf:
-            keep(self, "mjcf", str(path("mjcf", self.mjcf)))
-        instance_of("schedule", self.schedule, Schedule)
-
     def cells(self) -> tuple[Cell, ...]:
         """The simulations, in an order in which each finds what it depends on done before it."""
-        controllers = list(self.controllers)
-        later = [name for name in controllers if load_controller(name).source in LEARNED]
+        controllers = list(self.controller_names)
+        later = [name for name in controllers if self.controller(name).source in LEARNED]
         if later:
             others = [name for name in controllers if name not in ("ilc", *later)]
             controllers = ["ilc", *others, *later]
         return tuple(
-            Cell(
-                self.robot,
-                speeds,
-                controller,
-                scenario,
-                seed,
-                self.base,
-                self.mjcf,
-                self.schedule,
-                batch,
-            )
-            for batch, speeds in enumerate(self.batches or (self.speeds,))
+            Cell(controller, scenario, seed, batch, self)
+            for batch in range(len(self.batches) or 1)
             for controller in controllers
-            for scenario in self.scenarios
+            for scenario in self.scenario_names
             for seed in self.seeds
         )
 
 
+def _name(value: Any) -> str:
+    """Name of what is given by name or as an object; of a gait library, its robot's."""
+    return value if isinstance(value, str) else str(getattr(value, "name", None) or value.robot)
+
+
+def _find(values: Iterable[_T], name: str) -> _T | str:
+    """The one of a name; the name itself without one."""
+    return next((value for value in values if _name(value) == name), name)
+
+
+def _shortest(kind: str, value: _T, shipped: Callable[[str], _T | None]) -> str | _T:
+    """The name of what is shipped; else the object itself, whose name must not be taken."""
+    name = _name(value)
+    known = shipped(name)
+    if known is None:
+        return value
+    if describe(known) != describe(value):
+        raise InvalidInput(
+            f"{kind} '{name}' is not the one that is shipped under that name; give yours another "
+            "name"
+        )
+    return name
+
+
 def _fixed(one: Experiment, other: Experiment) -> Iterator[tuple[str, object, object]]:
     """What cannot be added to: name, and its value in either of two experiments."""
-    for name in ("robot", "base", "mjcf"):
+    yield "robot", describe(one.robot), describe(other.robot)
+    yield "gaits", _digest(one.gaits), _digest(other.gaits)
+    for name in ("apex", "base", "mjcf"):
         yield name, getattr(one, name), getattr(other, name)
     for part in dataclasses.fields(Schedule):
         name = part.name
         yield f"schedule.{name}", getattr(one.schedule, name), getattr(other.schedule, name)
 
 
+def _digest(gaits: str | GaitLibrary) -> str:
+    return gaits if isinstance(gaits, str) else gaits.sha256
+
+
 @dataclass(frozen=True)
 class Cell:
-    """One simulation of an experiment; see `Experiment` for the attributes.
+    """One simulation of an experiment: all speeds of a batch, one controller, scenario and seed.
 
-    Its `speeds` are those of one batch.
+    Attributes:
+        controller: Name of the controller.
+        scenario: Name of the scenario.
+        seed: Seed of the scatter at the start.
+        batch: Index of the speeds among the experiment's batches.
+        experiment: The experiment, with the objects of these names.
     """
 
-    robot: str
-    speeds: tuple[float, ...]
     controller: str
     scenario: str
     seed: int
-    base: str
-    mjcf: str
-    schedule: Schedule
-    batch: int = 0
+    batch: int
+    experiment: Experiment = field(compare=False, repr=False)
 
     @property
     def name(self) -> str:
@@ -202,91 +378,42 @@ class Cell:
         return f"{self.controller}_{self.scenario}_{self.seed}{later}"
 
     @property
-    def experiment(self) -> Experiment:
+    def speeds(self) -> tuple[float, ...]:
+        """Its speeds [m/s]."""
+        return (self.experiment.batches or (self.experiment.speeds,))[self.batch]
+
+    @property
+    def spec(self) -> ControllerSpec:
+        """Its controller."""
+        return self.experiment.controller(self.controller)
+
+    @property
+    def world(self) -> Scenario:
+        """Its scenario."""
+        return self.experiment.scenario(self.scenario)
+
+    @property
+    def alone(self) -> Experiment:
         """The experiment of this cell alone, and of the one that it depends on."""
-        return Experiment(
-            robot=self.robot,
+        experiment = self.experiment
+        return dataclasses.replace(
+            experiment,
             speeds=self.speeds,
-            controllers=(self.controller,),
-            scenarios=(self.scenario,),
+            controllers=(_find(experiment.controllers, self.controller),),
+            scenarios=(_find(experiment.scenarios, self.scenario),),
             seeds=(self.seed,),
-            base=self.base,
-            mjcf=self.mjcf,
-            schedule=self.schedule,
+            batches=(),
         )
 
     @property
     def depends_on(self) -> Cell | None:
         """The cell that learns what this one uses: the torque library, or the identified model."""
-        if load_controller(self.controller).source not in LEARNED:
+        if self.spec.source not in LEARNED:
             return None
         return dataclasses.replace(self, controller="ilc")
 
     @property
     def steps(self) -> int:
         """Time steps of the simulation."""
-        seconds = self.schedule.baseline + self.schedule.learning
-        return round(seconds / load_scenario(self.scenario).timestep)
-
-
-def run_cell(
-    cell: Cell, dependency: xr.Dataset | None = None, progress: Progress | None = None
-) -> xr.Dataset:
-    """Simulate a cell.
-
-    Args:
-        cell: Its description.
-        dependency: The strides of `cell.depends_on`, where there is such a cell.
-        progress: Called with the number of time steps done since the last call.
-
-    Returns:
-        The strides: see `compare.simulation.dataset`.
-    """
-    instance_of("cell", cell, Cell, "a Cell, one of Experiment.cells()")
-    robot, scenario = load_robot(cell.robot), load_scenario(cell.scenario, mjcf=cell.mjcf)
-    gaits = _gaits(cell.robot, cell.base, cell.speeds)
-    spec, model = load_controller(cell.controller), robot
-    if spec.source == "identified":
-        model = explain(learned_strides(spec, dependency)).identified
-    elif spec.gait_model == "datasheet":
-        model = with_rotors(robot)
-    if spec.gait_model != "urdf":
-        gaits = replan(model, gaits, base="locked" if cell.base == "locked" else "sagittal")
-    return simulate(
-        robot,
-        gaits,
-        spec,
-        scenario,
-        schedule=cell.schedule,
-        # One stream a seed, the same for every controller: they start from the same postures.
-        rng=np.random.default_rng(np.random.SeedSequence(cell.seed)),
-        initial=initial_feedforward(spec, gaits, model=model, learned=dependency, base=cell.base),
-        base=cell.base,
-        attributes=_attributes(cell),
-        progress=progress,
-    )
-
-
-def _gaits(robot: str, base: str, speeds: tuple[float, ...]) -> list[Gait]:
-    """The gaits of a base at some speeds: of a trunk that may turn those that let it pitch."""
-    library = load_library(robot) if base == "locked" else load_library(robot, base="sagittal")
-    return [library.at(speed) for speed in speeds]
-
-
-def _attributes(cell: Cell) -> dict[str, str | int | float]:
-    scenario = load_scenario(cell.scenario, mjcf=cell.mjcf)
-    definition = cell_definition(define(cell.experiment), cell)
-    return {
-        "robot": cell.robot,
-        "base": cell.base,
-        "scenario": cell.scenario,
-        "controller": cell.controller,
-        "seed": cell.seed,
-        "scenario_parameters": scenario.to_json(),
-        "mjcf": cell.mjcf,
-        "mjcf_sha256": definition["mjcf_sha256"],
-        "timestep": scenario.timestep,
-        "switch": cell.schedule.baseline,
-        "definition": to_text(definition),
-        "fingerprint": fingerprint(definition),
-    }
+        schedule = self.experiment.schedule
+        return round((schedule.baseline + schedule.learning) / self.world.timestep)

@@ -14,7 +14,7 @@ from ..._checks import Interval, instance_of, known_name, real, sequence_of, who
 from ...control import CONTROLLERS
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
-from ...robot import ModelParameters, Robot, load_robot
+from ...robot import ModelParameters, Robot, recorded_robot
 from .equations import DelayedEquations, PhaseForces, equations, phase_forces
 from .estimate import Confounding, Estimate, confounding, estimate, repetition
 from .ground_survey import Ground, survey
@@ -133,7 +133,7 @@ def explain(
         )
     check_learner(str(strides.attrs.get("controller", "")))
     rng = np.random.default_rng(0) if rng is None else rng
-    robot = load_robot(strides.attrs["robot"])
+    robot = recorded_robot(strides.attrs)
     recorded = recordings(strides, parts=tuple(parts), imu_noise=imu_noise, rng=rng)
     forces = {
         speed: tuple(phase_forces(robot, phase, terms) for phase in phases)

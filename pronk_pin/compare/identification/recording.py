@@ -16,7 +16,7 @@ import xarray as xr
 
 from ..._typing import Array
 from ...errors import InvalidInput
-from ...robot import NB, Robot, load_robot
+from ...robot import NB, Robot, recorded_robot
 from ..world import Scenario
 from .model_terms import LONGEST_DELAY, Motion
 
@@ -192,7 +192,7 @@ def _torque_before(torque: xr.DataArray, part: str, count: int) -> Array:
 
 def _lean(strides: xr.Dataset) -> Array:
     """Model's gravity less the simulated scenario's, along x and z [m/s^2], shape (2,)."""
-    model = load_robot(strides.attrs["robot"]).model.gravity.linear
+    model = recorded_robot(strides.attrs).model.gravity.linear
     try:
         world = Scenario.from_json(strides.attrs["scenario_parameters"]).gravity_vector
     except (KeyError, InvalidInput):  # strides of a robot

@@ -8,7 +8,7 @@ from scipy.integrate import trapezoid
 
 from ..._typing import Array
 from ...dynamics import cost_of_transport, mechanical_power
-from ...robot import NB, Robot, load_robot
+from ...robot import NB, Robot, recorded_robot
 
 TICKS = ("tick_base", "tick_base_rate", "tick_joints", "tick_joint_rates", "tick_torque")
 """Variables that it takes."""
@@ -28,7 +28,7 @@ def effort(strides: xr.Dataset) -> dict[str, tuple[Array, str]]:
     """
     if not set(TICKS) <= set(strides.data_vars):
         return {}
-    robot, dt = load_robot(strides.attrs["robot"]), float(strides.attrs["timestep"])
+    robot, dt = recorded_robot(strides.attrs), float(strides.attrs["timestep"])
     values = np.full((2, strides.sizes["speed"]), np.nan)
     for k in range(strides.sizes["speed"]):
         base, base_rate, joints, rates, torque = (_sequence(strides[name][k]) for name in TICKS)

@@ -9,6 +9,7 @@ import pandas as pd
 from scipy import stats
 
 from ...errors import InvalidInput
+from ..experiment import differences, to_document
 from ..metrics import LEAST_UNITS, Interval, compare_pairs, family, robots
 from ..results import Results
 from .cells import between, number
@@ -159,10 +160,18 @@ def _sign_flips(pairs: np.ndarray[Any, Any]) -> float:
 def _differences(first: Results, second: Results) -> list[str]:
     """What is different in how the two were made."""
     lines = []
-    one, other = vars(first.experiment), vars(second.experiment)
+    one, other = to_document(first.experiment), to_document(second.experiment)
     for name in one:
-        if one[name] != other.get(name):
-            lines.append(f"{name}: {_short(one[name])} -> {_short(other.get(name))}")
+        if one[name] != other[name]:
+            lines.append(f"{name}: {_short(one[name])} -> {_short(other[name])}")
+    for name in ("controllers", "scenarios"):
+        old, new = (
+            {each["name"]: each for each in part[name] if isinstance(each, dict)}
+            for part in (one, other)
+        )
+        for own in sorted(old.keys() & new.keys()):
+            if old[own] != new[own]:
+                lines.append(f"{own}: {differences(old[own], new[own])}")
     last = [results.provenance["runs"][-1:] for results in (first, second)]
     if all(last):
         (old,), (new,) = last
@@ -176,7 +185,10 @@ def _differences(first: Results, second: Results) -> list[str]:
 
 
 def _short(value: object) -> str:
-    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    """A setting as text; of an object its name."""
+    if isinstance(value, list | tuple):
+        return " ".join(map(_short, value))
+    return str(value.get("name", value)) if isinstance(value, dict) else str(value)
 
 
 def _line(key: Any, row: pd.Series) -> str:

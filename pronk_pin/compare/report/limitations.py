@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ...control import SKIPPED, load_controller
+from ...control import SKIPPED
 from ..metrics import CONFIDENCE, LEAST_UNITS, family, robots, sampled, table_1, unit_of
 from ..results import Results
 from .tables import SHOWN
@@ -33,17 +33,16 @@ def limitations(results: Results) -> list[str]:
 
 
 def _of_the_robot(results: Results) -> Iterator[str]:
-    if results.experiment.base == "locked":
+    experiment, names = results.experiment, results.experiment.controller_names
+    if experiment.base == "locked":
         yield "The trunk is locked to the sagittal plane without rotation, as in the paper."
     else:
-        with_true_attitude = [
-            name for name in results.experiment.controllers if not load_controller(name).imu
-        ]
+        with_true_attitude = [name for name in names if not experiment.controller(name).imu]
         if with_true_attitude:
-            names = _listed(with_true_attitude)
-            yield f"Under {names} the robots know the true attitude of their trunks."
-    learners = [name for name in results.experiment.controllers if any(load_controller(name).laws)]
-    stance_only = [name for name in learners if load_controller(name).flight_law is None]
+            listed = _listed(with_true_attitude)
+            yield f"Under {listed} the robots know the true attitude of their trunks."
+    learners = [name for name in names if any(experiment.controller(name).laws)]
+    stance_only = [name for name in learners if experiment.controller(name).flight_law is None]
     if stance_only:
         yield (
             f"{_listed(stance_only)} learn{'s' if len(stance_only) == 1 else ''} in stance only: "
@@ -61,7 +60,7 @@ def _of_the_robot(results: Results) -> Iterator[str]:
 
 
 def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
-    scenarios, seeds = results.experiment.scenarios, results.experiment.seeds
+    scenarios, seeds = results.experiment.scenario_names, results.experiment.seeds
     first = summary["controller"].iloc[0]
     families = {family(scenario) for scenario in scenarios}
     cells = itertools.product(sorted(families), summary["controller"].unique(), SHOWN)
@@ -155,7 +154,7 @@ def _of_the_learning(results: Results, summary: pd.DataFrame) -> Iterator[str]:
         places = ", ".join(f"{n} in {name}" for name, n in rows["scenario"].value_counts().items())
         yield f"{len(rows)} of {of} robots under {controller} have not settled: {places}."
     for cell in results.experiment.cells():
-        if not any(load_controller(cell.controller).laws):
+        if not any(cell.spec.laws):
             continue
         strides = results.strides(cell, ["skipped", "learning"])
         reasons = strides["skipped"].to_numpy()[strides["learning"].to_numpy() == 1]

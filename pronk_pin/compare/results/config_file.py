@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
 from ...errors import FileProblem, PronkError
 from ...storage import as_type, damaged, read_json, read_sealed, sealed
-from ..experiment import Definition, Experiment
+from ..experiment import Definition, Experiment, from_document, to_document
 from .remedies import MAKE_ONE
 
 CONFIG = "config.json"
@@ -23,7 +22,7 @@ def config_text(experiment: Experiment, definition: Definition) -> str:
     return sealed(
         {
             "schema": SCHEMA,
-            "experiment": dataclasses.asdict(experiment),
+            "experiment": to_document(experiment),
             "definition": definition,
         }
     )
@@ -44,7 +43,7 @@ def read_experiment(folder: Path) -> Experiment:
         raise FileProblem(path, f"schema {schema}, not {SCHEMA}", MAKE_ONE)
     config = read_sealed(path, MAKE_ONE)
     try:
-        return as_type(config.get("experiment"), Experiment, path, MAKE_ONE)
+        return from_document(config.get("experiment"), path, MAKE_ONE)
     except FileProblem:
         raise
     except PronkError as error:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from ..._checks import file_name
 from ...errors import FileProblem, OtherMachine, cannot_write
-from ...robot import load_robot
 from ...storage import read_text
-from ..experiment import Definition, define, differences
+from ..experiment import GAITS, Definition, define, differences
 from ..world import ForeignRobot, mjcf_sha256
 from .config_file import CONFIG, config_text, read_definition
 from .manifest import MANIFEST
@@ -51,11 +50,13 @@ def make_folder(results: Results, *, resimulate: bool = False) -> None:
         _check_definition(folder, definition) if stored else _check_strides(results)
     foreign = None
     if experiment.mjcf and known is None:
-        foreign = ForeignRobot.read(load_robot(experiment.robot), experiment.mjcf)
+        foreign = ForeignRobot.read(experiment.model, experiment.mjcf)
     try:
         (folder / "strides").mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise cannot_write(folder, error, "choose a folder of yours with --folder") from error
+    if not isinstance(experiment.gaits, str):
+        experiment.gaits.save(folder / GAITS)
     if foreign is not None:
         results.manifest.write(PARITY, foreign.to_json())
     config = config_text(experiment, definition)
@@ -119,7 +120,7 @@ def remove_if_empty(folder: Path) -> None:
     with contextlib.suppress(OSError):
         if any((folder / "strides").iterdir()):
             return
-        for name in (CONFIG, MANIFEST, PARITY, PROVENANCE, SUMMARY):
+        for name in (CONFIG, GAITS, MANIFEST, PARITY, PROVENANCE, SUMMARY):
             (folder / name).unlink(missing_ok=True)
         (folder / "strides").rmdir()
         folder.rmdir()

@@ -4,6 +4,7 @@
 file                   contents
 =====================  ==================================================================
 config.json            the experiment and its definition: who has it can make the rest again
+gaits.npz              its gaits, where they are not shipped (`Experiment.gaits`)
 manifest.json          SHA-256 of the strides, the summary and parity.json
 strides/<cell>.nc      every stride of one simulation (NetCDF-4), see `compare.simulation.dataset`
 summary.csv            one long table, see `compare.metrics`
@@ -61,6 +62,15 @@ class Results:
         default_factory=dict, init=False, repr=False, compare=False
     )
     """The summary that was written or read last, by the digests of the strides and of its file."""
+
+    def __repr__(self) -> str:
+        experiment = self.experiment
+        names = (experiment.controller_names, experiment.scenario_names)
+        return (
+            f"<Results in {self.folder}: {experiment.robot_name}, base {experiment.base}, "
+            f"{len(experiment.speeds)} speeds, {len(experiment.seeds)} seeds, "
+            f"controllers {' '.join(names[0])}, scenarios {' '.join(names[1])}>"
+        )
 
     @classmethod
     def load(cls, folder: Path | str) -> Results:
@@ -150,14 +160,14 @@ class Results:
         Raises:
             InvalidInput: The result does not have them.
         """
-        scenario = scenario or self.experiment.scenarios[0]
+        scenario = scenario or self.experiment.scenario_names[0]
         for cell in self.experiment.cells():
             if (cell.controller, cell.scenario) == (controller, scenario):
                 return cell
         known = ", ".join(sorted({cell.controller for cell in self.experiment.cells()}))
         raise InvalidInput(
             f"no '{controller}' in scenario '{scenario}'; the result has the controllers {known} "
-            f"in the scenarios {', '.join(self.experiment.scenarios)}"
+            f"in the scenarios {', '.join(self.experiment.scenario_names)}"
         )
 
     def path(self, cell: Cell) -> Path:

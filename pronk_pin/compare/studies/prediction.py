@@ -19,14 +19,13 @@ from ...control import (
     StrideRecord,
     StrideSettings,
     lifted_model,
-    load_controller,
     phase_grid,
 )
 from ...control.prediction import Analysis, analyze, predict, rehearse
 from ...dynamics import Rotors
 from ...errors import InvalidInput
 from ...gait import load_library
-from ...robot import JOINTS, load_robot
+from ...robot import JOINTS, load_robot, recorded_robot
 from ..report import number
 from ..results import Results
 from ..simulation import Schedule, simulate
@@ -117,7 +116,9 @@ def stored_learning(
     learning_law(spec)
     experiment = results.experiment
     if not _covered(spec):
-        suitable = [name for name in experiment.controllers if _covered(load_controller(name))]
+        suitable = [
+            name for name in experiment.controller_names if _covered(experiment.controller(name))
+        ]
         remedy = (
             f"choose {' or '.join(suitable)}, which this result has"
             if suitable
@@ -159,7 +160,7 @@ def compare_prediction(
         InvalidInput: The controller does not learn, or there are no strides before its learning.
     """
     law = learning_law(spec)
-    robot, gait = load_robot(strides.attrs["robot"]), load_library(strides.attrs["robot"]).at(speed)
+    robot, gait = recorded_robot(strides.attrs), load_library(strides.attrs["robot"]).at(speed)
     settings = StrideSettings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
     rotors = Rotors(scenario.armature, scenario.damping)
     model = lifted_model(robot, gait, settings, rotors=rotors)

@@ -151,7 +151,7 @@ def _read(results: Results, controller: str) -> dict[str, xr.DataArray]:
 
 def format_reproduction(results: Results, *, learners: tuple[str, ...]) -> str:
     """Table I row by row, and the readings, as text for a terminal."""
-    scenario = results.experiment.scenarios[0]
+    scenario = results.experiment.scenario_names[0]
     summary = results.summary()
     parts = [_format_rows(row_by_row(summary, scenario=scenario), "ILC")]
     for other in learners[1:]:

@@ -8,11 +8,19 @@ from .imu import InertialUnit, level_specific_force
 from .mismatch import KNOWN, MISMATCHES, Mismatch
 from .mjcf import ForeignRobot, mjcf_parity, mjcf_sha256, mjcf_spec
 from .motors import Motors
-from .scenario import SCENARIOS, Scenario, load_scenario, random_scenarios
+from .scenario import (
+    BASE_SCENARIOS,
+    SCENARIOS,
+    Scenario,
+    load_scenario,
+    random_scenarios,
+    shipped_scenario,
+)
 from .sensors import Sensors, SensorSuite
 from .world import Motion, World, build_model, finite, without_warnings
 
 __all__ = [
+    "BASE_SCENARIOS",
     "KNOWN",
     "MISMATCHES",
     "SCENARIOS",
@@ -33,5 +41,6 @@ __all__ = [
     "mjcf_sha256",
     "mjcf_spec",
     "random_scenarios",
+    "shipped_scenario",
     "without_warnings",
 ]

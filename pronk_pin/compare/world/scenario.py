@@ -3,8 +3,9 @@
 Scenarios go by name: `nominal`, `payload`, `payload=2+slope`, `ideal+delay`, `random-0-3`. A name
 is a world to begin with, and what is different in it, joined by `+`. Each mismatch has a value of
 its own, and takes another after `=`, in SI units. Without a world in front a mismatch is one of the
-nominal scenario. A cell of an experiment knows its scenario by name only, so a name says
-everything: the seed of a sampled scenario stands in it too.
+nominal scenario. Such a name says everything: the seed of a sampled scenario stands in it too. In
+front of a name may stand a scenario of one's own, by its address or its entry point:
+`my_package.worlds:hot+slope`; in Python they are added as they are: `hot + "slope"`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from __future__ import annotations
 import json
 import math
 import re
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -29,6 +31,7 @@ from ..._checks import (
     whole,
 )
 from ..._checks import seed as known_seed
+from ..._registry import announced_names, find, is_address
 from ...errors import InvalidInput, UnknownName
 from ...robot import ROTOR
 from ...storage import from_text
@@ -156,6 +159,36 @@ class Scenario:
         if not self.push_duration < self.push_period:
             raise self._wrong("push_duration must be shorter than push_period")
 
+    def __add__(self, other: Scenario | str) -> Scenario:
+        """This scenario with the mismatches of another one, too.
+
+        A mismatch is what is as in neither of the scenarios `ideal` and `nominal`.
+
+        Raises:
+            InvalidInput: Both change the same thing, and differently.
+            UnknownName: There is no scenario of that name.
+        """
+        other, changes = load_scenario(other), {}
+        own = dict(self._mismatches())
+        for name, value in other._mismatches():
+            if own.get(name, value) != value:
+                raise InvalidInput(
+                    f"scenarios '{self.name}' and '{other.name}' both change {name}; keep one"
+                )
+            changes[name] = value
+        return replace(self, **changes, name=f"{self.name}+{other.name}")
+
+    def __radd__(self, other: str) -> Scenario:
+        """A scenario by name with the mismatches of this one."""
+        return load_scenario(other) + self
+
+    def _mismatches(self) -> Iterator[tuple[str, Any]]:
+        for known in fields(self):
+            value = getattr(self, known.name)
+            usual = [getattr(world, known.name) for world in BASE_SCENARIOS.values()]
+            if known.name != "name" and value not in usual:
+                yield known.name, value
+
     def to_json(self) -> str:
         """The scenario as JSON; `from_json` reads it."""
         return json.dumps(asdict(self))
@@ -234,17 +267,21 @@ BASE_SCENARIOS = {
 _SAMPLED = re.compile(r"random-(\d{1,9})-(\d{1,9})")
 
 
-def load_scenario(name: str, *, mjcf: str = "") -> Scenario:
+def load_scenario(name: str | Scenario, *, mjcf: str = "") -> Scenario:
     """The scenario of that name; it bears the name in its shortest form.
 
     Args:
-        name: As above: `payload`, `nominal+payload=2+slope`, `ideal`, `random-0-3+delay`.
+        name: As above: `payload`, `nominal+payload=2+slope`, `ideal`, `random-0-3+delay`,
+            `my_package.worlds:hot+slope`; a `Scenario` is returned as it is.
         mjcf: Path of an MJCF that stands in for the robot's URDF.
 
     Raises:
         UnknownName: A part of it is not known.
-        InvalidInput: A value is out of range, or two parts change the same thing.
+        InvalidInput: A value is out of range, two parts change the same thing, or what an address
+            names cannot be imported, or is something else.
     """
+    if isinstance(name, Scenario):
+        return replace(name, mjcf=mjcf or name.mjcf)
     first, *rest = text("scenario", name).split("+")
     scenario = _world(first)
     if scenario is None:
@@ -267,11 +304,25 @@ def load_scenario(name: str, *, mjcf: str = "") -> Scenario:
     return replace(scenario, **changes, name=short, mjcf=mjcf)
 
 
+def shipped_scenario(name: str) -> Scenario | None:
+    """The scenario that a name means everywhere, whatever is installed; None without one."""
+    first, *rest = (part.partition("=")[0] for part in name.split("+"))
+    known = {first in BASE_SCENARIOS, first in KNOWN, _SAMPLED.fullmatch(first) is not None}
+    if True not in known or not all(part in KNOWN for part in rest):
+        return None
+    return load_scenario(name)
+
+
 def _world(name: str) -> Scenario | None:
+    """The world that a name may begin with; None if it is none."""
     sampled = _SAMPLED.fullmatch(name)
     if sampled:
         return _sample(*map(int, sampled.groups()))
-    return BASE_SCENARIOS.get(name)
+    if name.partition("=")[0] in KNOWN:
+        return None
+    if name in BASE_SCENARIOS or is_address(name) or name in announced_names("scenario"):
+        return find("scenario", name, BASE_SCENARIOS, Scenario)
+    return None
 
 
 def _values(name: str, parts: list[str]) -> dict[str, float]:

@@ -112,8 +112,8 @@ def write_report(results: Results, *, command: str = "") -> Path:
 
 def report(results: Results, *, command: str = "") -> Document:
     """The report as a document, see `write_report`."""
-    summary, scenarios = results.summary(), families(results.experiment.scenarios)
-    document = Document(f"Does practice beat the model? {results.experiment.robot.upper()}")
+    summary, scenarios = results.summary(), families(results.experiment.scenario_names)
+    document = Document(f"Does practice beat the model? {results.experiment.robot_name.upper()}")
     tables = answer(summary)
     document.text(answer_in_words(summary, tables=tables), "verdict")
     if len(scenarios) > 1:
@@ -167,10 +167,10 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     Raises:
         FileProblem: The folder cannot be written, or the result is damaged.
     """
-    figures_by_name = scenario_figures(results, results.experiment.scenarios[0])
-    if len(families(results.experiment.scenarios)) > 1:
+    figures_by_name = scenario_figures(results, results.experiment.scenario_names[0])
+    if len(families(results.experiment.scenario_names)) > 1:
         figures_by_name |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
-    for world in filter(sampled, families(results.experiment.scenarios)):
+    for world in filter(sampled, families(results.experiment.scenario_names)):
         table = sampled_scenarios(results.summary(), scenario=world)
         figures_by_name[f"{world}-by-world"] = figures.by_scenario(table)
     return [
@@ -222,7 +222,7 @@ def _learning_figures(results: Results) -> dict[str, tuple[Figure, str]]:
     for cell in results.experiment.cells():
         history = peak_history(results.strides(cell, VARIABLES))
         histories.setdefault(family(cell.scenario), []).append(history)
-    ordered = {name: histories[name] for name in families(results.experiment.scenarios)}
+    ordered = {name: histories[name] for name in families(results.experiment.scenario_names)}
     return {
         f"learning-{joint}": (
             figures.peak_curves(ordered, joint=joint),
@@ -237,8 +237,8 @@ def _world(
     document: Document, results: Results, summary: pd.DataFrame, table: Overview, scenario: str
 ) -> None:
     """The section about one scenario; the first one has all figures."""
-    scenarios = families(results.experiment.scenarios)
-    drawn = [name for name in results.experiment.scenarios if family(name) == scenario]
+    scenarios = families(results.experiment.scenario_names)
+    drawn = [name for name in results.experiment.scenario_names if family(name) == scenario]
     where = f"{len(drawn)} sampled scenarios" if sampled(scenario) else "scenario"
     document.heading(f'Controllers in the {where} "{scenario}"', scenario)
     if len(scenarios) > 1:
@@ -249,15 +249,15 @@ def _world(
     document.text(f"Intervals are drawn over the {units}." if units else "", "note")
     if sampled(scenario):
         _sampled(document, results, summary, scenario)
-    if scenario != scenarios[0] or scenario not in results.experiment.scenarios:
+    if scenario != scenarios[0] or scenario not in results.experiment.scenario_names:
         return
     found = scenario_figures(results, scenario)
     document.picture("errors", found["errors"], _CAPTIONS["errors"])
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
-    if {"pd", LEARNER} <= set(results.experiment.controllers):
+    if {"pd", LEARNER} <= set(results.experiment.controller_names):
         document.heading("Table I, beside the paper's", f"{scenario}-table", level=3)
         _beside(document, beside_the_paper(summary, scenario=scenario), table)
-    if LEARNER in results.experiment.controllers:
+    if LEARNER in results.experiment.controller_names:
         document.heading("Before and after, and what was learned", f"{scenario}-learned", level=3)
         if "tracking" not in found:
             document.text("Nothing to show: no robot stayed up that learning taught something.")
@@ -328,7 +328,7 @@ def _sampled(document: Document, results: Results, summary: pd.DataFrame, scenar
         "that did not fall; in the order of the figure."
     )
     document.table(report_tables.each_scenario(table))
-    if len(families(results.experiment.scenarios)) > 1:
+    if len(families(results.experiment.scenario_names)) > 1:
         return  # learning has its figures for all scenarios
     for name, (figure, caption) in _learning_figures(results).items():
         document.picture(name, figure, caption)

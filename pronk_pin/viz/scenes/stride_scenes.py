@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from ..._checks import instance_of, none_or, real, whole
 from ..._typing import Array, BoolArray
-from ...compare import Results, load_scenario
+from ...compare import Results
 from ...errors import InvalidInput
-from ...gait import Gait, load_library
-from ...robot import Robot, load_robot
+from ...gait import Gait
+from ...robot import Robot
 from ..figure_style import look
 from .gait_scenes import SHOWN_SPEED, nearest, numbers
 from .menu import Choice, Menu
@@ -66,10 +66,10 @@ def result_menu(
     """
     speed, stride = none_or(real, "speed", speed), none_or(whole, "stride", stride)
     experiment = instance_of("results", results, Results).experiment
-    speeds, controllers = list(experiment.speeds), list(experiment.controllers)
+    speeds, controllers = list(experiment.speeds), list(experiment.controller_names)
     if controller is None:
         controller = "ilc" if "ilc" in controllers else controllers[0]
-    scenario = experiment.scenarios[0] if scenario is None else scenario
+    scenario = experiment.scenario_names[0] if scenario is None else scenario
     at = None if speed is None else nearest(speeds, speed, "speed")
     strides = results.all_strides(controller=controller, scenario=scenario)
     windows = _windows(strides)
@@ -87,7 +87,7 @@ def result_menu(
     options = {
         SPEED: numbers(speeds),
         CONTROLLER: controllers,
-        SCENARIO: list(experiment.scenarios),
+        SCENARIO: list(experiment.scenario_names),
         BESIDE: [ALONE, EARLIER, *controllers],
         STRIDES: windows,
     }
@@ -107,10 +107,7 @@ class _Reader:
         """The scene of a choice."""
         speed, scenario = float(choice[SPEED]), choice[SCENARIO]
         experiment = self.results.experiment
-        robot, base = load_robot(experiment.robot), experiment.base
-        # As the experiment does: of a trunk that may turn, the gaits that let it pitch.
-        library = load_library(robot.name, base=None if base == "locked" else "sagittal")
-        gait = library.at(speed)
+        robot, (gait,) = experiment.model, experiment.planned_at([speed])
         strides = self._strides(choice[CONTROLLER], scenario, speed)
         shown = _cut(strides, choice[STRIDES])
         tracks = [*_pair(robot, gait, shown, look(choice[CONTROLLER]).label)]
@@ -132,7 +129,7 @@ class _Reader:
             force_window=FORCE_WINDOW,
             title=f"{robot.name.upper()} pronking at {speed:g} m/s",
             caption=f"scenario {scenario}, strides {choice[STRIDES]}{note}",
-            friction=load_scenario(scenario).ground_friction,
+            friction=experiment.scenario(scenario).ground_friction,
         )
 
     def _strides(self, controller: str, scenario: str, speed: float) -> xr.Dataset:

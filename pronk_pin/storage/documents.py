@@ -1,19 +1,26 @@
-"""JSON documents: read, compared with a type, and sealed against changes."""
+"""JSON, TOML and YAML documents: read, compared with a type, and sealed against changes."""
 
 from __future__ import annotations
 
 import functools
 import hashlib
 import json
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 import msgspec.inspect
+import yaml
 
 from ..errors import InvalidInput
 from .reading import damaged, read_text, reading
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 _T = TypeVar("_T")
 
@@ -27,6 +34,28 @@ def read_json(path: Path | str, remedy: str) -> Any:
     text = read_text(path, remedy)
     with reading(path, remedy):
         return json.loads(text)
+
+
+def read_toml(path: Path | str, remedy: str) -> dict[str, Any]:
+    """Read a TOML document.
+
+    Raises:
+        FileProblem: It cannot be read, or is no TOML.
+    """
+    text = read_text(path, remedy)
+    with reading(path, remedy):
+        return tomllib.loads(text)
+
+
+def read_yaml(path: Path | str, remedy: str) -> Any:
+    """Read a YAML document; JSON is one.
+
+    Raises:
+        FileProblem: It cannot be read, or is no YAML.
+    """
+    text = read_text(path, remedy)
+    with reading(path, remedy):
+        return yaml.safe_load(text)
 
 
 def as_type(

@@ -1,0 +1,97 @@
+"""The command `pronk-pin list`: what can be named, with a line about each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from tyro.conf import Positional
+
+from .._registry import announced_names
+from ..compare import KNOWN
+from ..compare.experiment import SUITES, load_suite
+from ..compare.world import BASE_SCENARIOS
+from ..control import CONTROLLERS, ControllerSpec, load_controller
+from ..gait import shipped_libraries
+from ..robot import ROBOTS, load_robot_spec
+
+Kind: TypeAlias = Literal["controllers", "robots", "gaits", "scenarios", "suites"]
+
+
+@dataclass(frozen=True)
+class List:
+    """List what can be named: what is shipped, and what installed packages announce."""
+
+    kind: Positional[Kind] = "controllers"
+    """What to list."""
+
+    def run(self) -> None:
+        """Do it."""
+        rows = list(_LISTS[self.kind]())
+        width = max(len(name) for name, _ in rows)
+        for name, text in rows:
+            print(f"{name:<{width}}  {text}".rstrip())
+
+
+def _controllers() -> Iterator[tuple[str, str]]:
+    for name in (*CONTROLLERS, *announced_names("controller")):
+        yield name, _what_it_does(load_controller(name))
+
+
+def _what_it_does(spec: ControllerSpec) -> str:
+    learned = [part for part, law in zip(("stance", "flight"), spec.laws, strict=True) if law]
+    torque = type(spec.torque_law).__name__ if spec.torque_law else ""
+    begins = "" if spec.source == "none" else f"begins with torques of the {spec.source}"
+    parts = (
+        f"computes torques at every tick ({torque})" if torque else begins,
+        f"learns in {' and '.join(learned)}" if learned else "",
+        "adapts the flight's duration" if spec.timing else "",
+        f"knows {', '.join(spec.knows)}" if spec.knows else "knows nothing",
+    )
+    return "; ".join(filter(None, parts))
+
+
+def _robots() -> Iterator[tuple[str, str]]:
+    for name in (*ROBOTS, *announced_names("robot")):
+        yield name, load_robot_spec(name).urdf
+
+
+def _gaits() -> Iterator[tuple[str, str]]:
+    for library in sorted(shipped_libraries(), key=lambda one: (one.robot, one.base)):
+        speeds, apexes = library.speeds, library.apexes
+        gait = library.metadata.get("gait", "pronk")
+        yield (
+            f"{gait} of {library.robot}, base {library.base}",
+            f"{speeds[0]:g} to {speeds[-1]:g} m/s, apex {' '.join(f'{h:g}' for h in apexes)} m",
+        )
+
+
+def _scenarios() -> Iterator[tuple[str, str]]:
+    for name in BASE_SCENARIOS:
+        yield name, "a world to begin with"
+    for name, mismatch in KNOWN.items():
+        yield f"{name}={mismatch.value:g}", f"{mismatch.text} [{mismatch.unit}]"
+    yield "random-SEED-INDEX", "a sampled scenario"
+    for name in announced_names("scenario"):
+        yield name, "announced by an installed package"
+
+
+def _suites() -> Iterator[tuple[str, str]]:
+    for name in SUITES:
+        suite = load_suite(name)
+        yield (
+            name,
+            f"{len(suite.cells())} simulations of {len(suite.speeds)} robots: "
+            f"{len(suite.controllers)} controllers, {len(suite.scenarios)} scenarios, "
+            f"{len(suite.seeds)} seeds",
+        )
+
+
+_LISTS: dict[Kind, Callable[[], Iterator[tuple[str, str]]]] = {
+    "controllers": _controllers,
+    "robots": _robots,
+    "gaits": _gaits,
+    "scenarios": _scenarios,
+    "suites": _suites,
+}

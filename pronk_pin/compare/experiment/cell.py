@@ -1,0 +1,72 @@
+"""Simulation of one cell of an experiment."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from ..._checks import instance_of
+from ...gait import replan
+from ...robot import robot_attributes, with_rotors
+from ..identification import explain
+from ..simulation import Progress, simulate
+from .definition import cell_definition, define, fingerprint, to_text
+from .experiment import Cell
+from .initial_feedforward import initial_feedforward, learned_strides
+
+
+def run_cell(
+    cell: Cell, dependency: xr.Dataset | None = None, progress: Progress | None = None
+) -> xr.Dataset:
+    """Simulate a cell.
+
+    Args:
+        cell: Its description.
+        dependency: The strides of `cell.depends_on`, where there is such a cell.
+        progress: Called with the number of time steps done since the last call.
+
+    Returns:
+        The strides: see `compare.simulation.dataset`.
+    """
+    instance_of("cell", cell, Cell, "a Cell, one of Experiment.cells()")
+    experiment, spec = cell.experiment, cell.spec
+    gaits, robot, base = experiment.planned_at(cell.speeds), experiment.model, experiment.base
+    model = robot
+    if spec.source == "identified":
+        model = explain(learned_strides(spec, dependency), gaits=gaits).identified
+    elif spec.gait_model == "datasheet":
+        model = with_rotors(robot)
+    if spec.gait_model != "urdf":
+        gaits = replan(model, gaits, base="locked" if base == "locked" else "sagittal")
+    return simulate(
+        robot,
+        gaits,
+        spec,
+        cell.world,
+        schedule=experiment.schedule,
+        # One stream a seed, the same for every controller: they start from the same postures.
+        rng=np.random.default_rng(np.random.SeedSequence(cell.seed)),
+        initial=initial_feedforward(spec, gaits, model=model, learned=dependency, base=base),
+        base=base,
+        attributes=_attributes(cell),
+        progress=progress,
+    )
+
+
+def _attributes(cell: Cell) -> dict[str, str | int | float]:
+    experiment, scenario = cell.experiment, cell.world
+    definition = cell_definition(define(cell.alone), cell)
+    return {
+        **robot_attributes(experiment.model.spec),
+        "base": experiment.base,
+        "scenario": cell.scenario,
+        "controller": cell.controller,
+        "seed": cell.seed,
+        "scenario_parameters": scenario.to_json(),
+        "mjcf": experiment.mjcf,
+        "mjcf_sha256": definition["mjcf_sha256"],
+        "timestep": scenario.timestep,
+        "switch": experiment.schedule.baseline,
+        "definition": to_text(definition),
+        "fingerprint": fingerprint(definition),
+    }

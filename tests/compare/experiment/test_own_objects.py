@@ -1,0 +1,280 @@
+"""Objects of a user's own, by object, address or file: run, stored, and read again without them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pronk_pin import cli
+from pronk_pin.compare import Experiment, Results, Scenario, Schedule, load_scenario, run_experiment
+from pronk_pin.compare.experiment import define, read_config
+from pronk_pin.compare.experiment.description import Unloaded, describe, restore
+from pronk_pin.control import CONTROLLERS, ControllerSpec, PDTypeILC, load_controller
+from pronk_pin.errors import FileProblem, InvalidInput, UnknownName
+from pronk_pin.gait import load_library
+from pronk_pin.robot import ROBOTS, RobotSpec
+
+LABORATORY = """
+from dataclasses import dataclass
+
+from pronk_pin.compare import Scenario
+from pronk_pin.control import ControllerSpec
+
+
+@dataclass(frozen=True)
+class MyLaw:
+    gain: float = 0.3
+
+    def update(self, record):
+        return record.feedforward + self.gain * record.feedback
+
+
+class Untold:
+    def update(self, record):
+        return record.feedforward
+
+
+controller = ControllerSpec("mine", law=MyLaw(0.3))
+untold = ControllerSpec("untold", law=Untold())
+hot = Scenario("hot", torque_constant=0.9, coulomb=0.4)
+number = 3
+"""
+
+SHORT = Schedule(startup=0.2, baseline=1.0, learning=1.5)
+
+
+@pytest.fixture
+def laboratory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The name of a module of one's own, in the folder that the program was started in."""
+    name = "laboratory_" + tmp_path.name.replace("-", "_")
+    (tmp_path / f"{name}.py").write_text(LABORATORY)
+    monkeypatch.chdir(tmp_path)
+    return name
+
+
+def own(laboratory: str, **changes: object) -> Experiment:
+    settings = {
+        "speeds": (0.3,),
+        "controllers": ("pd", f"{laboratory}:controller"),
+        "scenarios": ("nominal", f"{laboratory}:hot+slope=0.05"),
+        "schedule": SHORT,
+        **changes,
+    }
+    return Experiment(**settings)  # type: ignore[arg-type]
+
+
+def test_objects_names_and_addresses_are_one(laboratory: str) -> None:
+    by_address = own(laboratory)
+    spec, hot = load_controller(f"{laboratory}:controller"), load_scenario(f"{laboratory}:hot")
+    by_object = own(laboratory, controllers=("pd", spec), scenarios=("nominal", hot + "slope=0.05"))
+    assert by_address == by_object
+    assert by_object.controller_names == ("pd", "mine")
+    assert by_object.scenario_names == ("nominal", "hot+slope=0.05")
+    shipped = Experiment(controllers=(CONTROLLERS["pd"],), scenarios=(load_scenario("payload"),))
+    assert (shipped.controllers, shipped.scenarios) == (("pd",), ("payload",))
+
+
+def test_what_is_stored_is_read_by_a_process_that_never_saw_the_class(laboratory: str) -> None:
+    results = run_experiment(own(laboratory), "result", workers=2, progress=False)
+    assert set(results.summary()["controller"]) == {"pd", "mine"}
+    # Elsewhere nobody can import the law: what does not need it works all the same.
+    elsewhere = Path("elsewhere")
+    elsewhere.mkdir()
+    folder = str(results.folder.resolve())
+    for command in (
+        ["report", folder],
+        ["compare", "--folder", folder],
+        ["report", folder, folder],
+    ):
+        done = _pronk_pin(command, elsewhere)
+        assert done.returncode == 0, done.stderr
+    done = _pronk_pin(["compare", "--folder", folder, "--seeds", "0", "1"], elsewhere)
+    assert done.returncode == 1
+    assert f"{laboratory}:MyLaw: module {laboratory} cannot be imported" in done.stderr
+    # Where it can be imported, the same command goes on.
+    done = _pronk_pin(["compare", "--folder", folder, "--seeds", "0", "1"], Path())
+    assert done.returncode == 0, done.stderr
+    assert {cell.seed for cell in Results.load(folder).experiment.cells()} == {0, 1}
+
+
+def _pronk_pin(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "pronk_pin",
+            *arguments,
+            *(["--workers", "1"] * ("compare" in arguments)),
+        ],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def test_a_stored_law_that_has_changed_or_cannot_be_made_is_refused(laboratory: str) -> None:
+    results = run_experiment(own(laboratory), "result", workers=1, progress=False)
+    stored = Results.load(results.folder).experiment
+    law = stored.controller("mine").law
+    assert isinstance(law, Unloaded)
+    assert describe(law) == describe(load_controller(f"{laboratory}:controller").law)
+    changed = replace(law, description={**law.description, "source_sha256": "0" * 64})
+    with pytest.raises(InvalidInput, match="has changed since; put the old one back"):
+        changed.load()
+    untold = own(laboratory, controllers=("pd", f"{laboratory}:untold"))
+    document = describe(untold.controller("untold"))
+    with pytest.raises(InvalidInput, match=r"no dataclass.*pass the experiment with the object"):
+        restore(document, ControllerSpec, "it").law.load()  # type: ignore[union-attr]
+    # The experiment with the object itself goes on with the folder.
+    more = own(laboratory, seeds=(0, 1))
+    assert run_experiment(more, results.folder, workers=1, progress=False).experiment.seeds == (
+        0,
+        1,
+    )
+    other = own(laboratory, controllers=("pd", ControllerSpec("mine", law=PDTypeILC())))
+    with pytest.raises(FileProblem, match="'mine' of the controllers is another one there"):
+        run_experiment(other, results.folder, workers=1, progress=False)
+
+
+def test_everything_shipped_comes_back_from_its_description() -> None:
+    for spec in CONTROLLERS.values():
+        text = json.dumps(describe(spec))
+        assert restore(json.loads(text), ControllerSpec, spec.name) == spec
+    for scenario in (load_scenario("noise+payload"), load_scenario("random-0-3")):
+        assert restore(json.loads(json.dumps(describe(scenario))), Scenario, "it") == scenario
+    for robot in ROBOTS.values():
+        assert restore(json.loads(json.dumps(describe(robot))), RobotSpec, "it") == robot
+
+
+def test_an_experiment_is_written_by_hand(laboratory: str) -> None:
+    Path("mine.yaml").write_text(
+        f"""
+speeds: [0.0, 0.3]
+controllers:
+  - pd
+  - {laboratory}:controller
+  - {{name: gentle, law: {{class: PDTypeILC, gain: 0.2}}, timing: {{}}}}
+scenarios: [nominal, {{name: moon, gravity: 1.62}}]
+schedule: {{baseline: 2.0, learning: 3.0}}
+"""
+    )
+    read = read_config("mine.yaml")
+    assert read.controller("gentle").law == PDTypeILC(gain=0.2)
+    assert read.controller("gentle").timing is not None
+    assert read.scenario("moon") == Scenario("moon", gravity=1.62)
+    assert (read.schedule.learning, read.robot, read.seeds) == (3.0, "a1", (0,))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("controllers: [{name: x, law: {class: Nothing}}]", "no class 'Nothing'"),
+        ("controllers: [{name: x, strength: 2}]", "no field 'strength'"),
+        ("controllers: [{source: model}]", "name"),
+        ("scenarios: [{name: x, gravity: heavy}]", "gravity"),
+        ("controllers: 3", "Expected `array"),
+        ("controller: [pd]", "unknown field controller"),
+        ("speeds: [a]", "Expected `float"),
+        ("[1, 2]", "Expected `object`"),
+        ("a: b: c", "damaged"),
+        ("robot: {name: x}", "urdf"),
+        ("controllers: [{name: pd, source: model}]", "give yours another name"),
+        ("controllers: [{name: ../x}]", "name of a file"),
+    ],
+)
+def test_a_wrong_config_says_what_is_wrong(text: str, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "x.yaml"
+    path.write_text(text)
+    with pytest.raises(FileProblem, match=words):
+        read_config(path)
+
+
+def test_what_is_named_in_vain_says_so(laboratory: str) -> None:
+    for address, words in (
+        ("nowhere.at_all:thing", "cannot be imported"),
+        (f"{laboratory}:nothing", "has no nothing"),
+        (f"{laboratory}:number", "is a int"),
+    ):
+        with pytest.raises(InvalidInput, match=words):
+            Experiment(controllers=("pd", address))
+    with pytest.raises(UnknownName):
+        Experiment(controllers=("mine",))
+    with pytest.raises(InvalidInput, match="give a ControllerSpec, or a name"):
+        Experiment(controllers=(3,))  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="not the one that is shipped under that name"):
+        Experiment(controllers=(ControllerSpec("ilc"),))
+    with pytest.raises(InvalidInput, match="none of them twice"):
+        own(laboratory, controllers=(f"{laboratory}:controller", ControllerSpec("mine")))
+
+
+def test_scenarios_are_added() -> None:
+    hot = Scenario("hot", torque_constant=0.9, coulomb=0.4)
+    both = hot + "payload=1+slope"
+    assert (both.payload, both.slope, both.coulomb, both.armature) == (1.0, 0.1, 0.4, 0.0)
+    assert ("payload" + hot).armature == load_scenario("payload").armature
+    assert (load_scenario("payload") + "slope").name == "payload+slope"
+    with pytest.raises(InvalidInput, match="both change torque_constant"):
+        hot + "weak-motors"
+
+
+def test_gaits_and_robots_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A robot from TOML with the A1's URDF, and gaits of that name, end to end from the shell."""
+    spec = ROBOTS["a1"]
+    (tmp_path / "robot.toml").write_text(
+        f'name = "twin"\nurdf = "{spec.urdf}"\nrotors = {list(spec.rotors)}\n'
+    )
+    robot = RobotSpec.load(tmp_path / "robot.toml")
+    assert robot == replace(spec, name="twin")
+    with pytest.raises(FileProblem, match="no such gait library is shipped"):
+        Experiment(robot=robot)
+    library = load_library("a1")
+    with pytest.raises(InvalidInput, match="gaits of a1, and the robot is twin"):
+        Experiment(robot=robot, gaits=library)
+    gaits = tuple(replace(gait, robot="twin") for gait in library.gaits)
+    audits = tuple(
+        replace(audit, motion=gait.sha256) for gait, audit in zip(gaits, library.audit, strict=True)
+    )
+    twin = replace(
+        library, gaits=gaits, audit=audits, metadata={**library.metadata, "robot": "twin"}
+    )
+    path = twin.save(tmp_path / "gaits.npz")
+    words = [
+        *("compare", "--robot", str(tmp_path / "robot.toml"), "--gaits", str(path)),
+        *("--apex", "0.33", "--speeds", "0.3", "--controllers", "pd", "model", "ilc"),
+        *("--schedule.baseline", "1.5", "--schedule.learning", "1.5"),
+        *("--folder", str(tmp_path / "result"), "--workers", "1"),
+    ]
+    assert cli.main(words) == 0
+    assert "robot twin" in capsys.readouterr().out
+    path.unlink()
+    (tmp_path / "robot.toml").unlink()  # the folder has all it needs
+    results = Results.load(tmp_path / "result")
+    assert results.experiment.robot == robot
+    assert results.experiment.apex == 0.33
+    assert results.experiment.library == twin
+    assert define(results.experiment)["gaits"]["0.3"] == twin.at(0.3, 0.33).sha256
+    assert cli.main(["report", str(tmp_path / "result")]) == 0
+    # The same gait and URDF under another name: the same strides as the A1's.
+    other = Experiment(
+        apex=0.33, speeds=(0.3,), controllers=("pd",), schedule=results.experiment.schedule
+    )
+    a1 = run_experiment(other, tmp_path / "a1", workers=1, progress=False)
+    peaks = [
+        one.strides(one.find(controller="pd"))["peak_error"].to_numpy() for one in (results, a1)
+    ]
+    np.testing.assert_array_equal(*peaks)
+
+
+def test_gaits_of_another_base_are_refused() -> None:
+    with pytest.raises(InvalidInput, match="planned for base 'locked', and base 'free' needs"):
+        Experiment(gaits=load_library("a1"), base="free")
+    with pytest.raises(InvalidInput, match=r"which ends in \.npz"):
+        Experiment(gaits="trot")
