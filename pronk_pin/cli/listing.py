@@ -41,7 +41,7 @@ def _controllers() -> Iterator[tuple[str, str]]:
 
 def _what_it_does(spec: ControllerSpec) -> str:
     learned = [part for part, law in zip(("stance", "flight"), spec.laws, strict=True) if law]
-    torque = type(spec.torque_law).__name__ if spec.torque_law else ""
+    torque = type(spec.tick_controller).__name__ if spec.tick_controller else ""
     begins = "" if spec.source == "none" else f"begins with torques of the {spec.source}"
     parts = (
         f"computes torques at every tick ({torque})" if torque else begins,

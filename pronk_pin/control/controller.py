@@ -42,6 +42,7 @@ from .signals import (
     phase_grid,
     resample,
 )
+from .tick_control import ControlTime, TickLoop
 
 LATEST_TOUCHDOWN = 2.0
 """Longest flight, over its planned duration, after which it ends without a touchdown."""
@@ -81,7 +82,8 @@ class Controller:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
         balance: The balance of a trunk that may turn; None where it is locked.
-        torque_control: What computes the torques at every tick; None where tapes and gains do.
+        tick_loop: What asks the tick controller; None where tapes and gains make the torques.
+        time: How long the controller has computed at events.
         guard: The guard of the learning; None without one.
         skipped: Reason not to learn from the robots' last strides, index into `SKIPPED`,
             shape (n,).
@@ -123,9 +125,10 @@ class Controller:
         of_flight = replace(context, part="flight")
         self._laws = [bound(spec.law, context), bound(spec.flight_law, of_flight)]
         self.balance = spec.balance.bind(context)
-        self.torque_control = None
-        if spec.torque_law is not None:
-            self.torque_control = spec.torque_law.bind(context)
+        self.tick_loop = None
+        if spec.tick_controller is not None:
+            self.tick_loop = TickLoop(spec.tick_controller, context)
+        self.time = ControlTime()
         self.guard = None
         if spec.guard is not None:
             self.guard = GuardState(spec.guard, Memory(self.feedforward, self._flight.duration))
@@ -169,7 +172,8 @@ class Controller:
         position = np.repeat(self._stance.position[:, :1], ticks, axis=1)
         zero = np.zeros_like(position)
         length = np.full(n, ticks, dtype=np.intp)
-        return Tape(zero, position, zero, length, acceleration=zero)
+        phase = np.zeros((n, ticks))
+        return Tape(zero, position, zero, length, acceleration=zero, phase=phase)
 
     def touchdown(
         self, rows: IntArray, learning: BoolArray | None = None, *, late: int | None = None
@@ -190,14 +194,24 @@ class Controller:
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
         reference, position = self._stance, self._stance.position[rows]
+        acceleration, phase = self._of_the_tick(reference, rows, slice(None))
         return Tape(
             feedforward=self._played(0, rows),
             position=position,
             velocity=reference.velocity[rows],
             length=reference.ticks[rows],
             begin=self.spec.touchdown_ticks if late is None else late,
-            acceleration=None if self.torque_control is None else reference.acceleration(rows),
+            acceleration=acceleration,
+            phase=phase,
         )
+
+    def _of_the_tick(
+        self, reference: Reference, rows: IntArray, ticks: slice
+    ) -> tuple[Array | None, Array | None]:
+        """What only a tick controller reads of a tape: accelerations and phases."""
+        if self.tick_loop is None:
+            return None, None
+        return reference.acceleration(rows, ticks), reference.phase[rows, ticks]
 
     def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
         """Write the flight tapes of robots that have just finished a stance, and its record."""
@@ -216,10 +230,9 @@ class Controller:
         position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
         velocity = reference.velocity[rows, ticks]
         velocity[..., 1::3] += rate[..., None]
-        acceleration = None
-        if self.torque_control is not None:
-            acceleration = reference.acceleration(rows, ticks)
-            curvature = self.spec.regulator.profile_curvature(reference.phase[rows, ticks])
+        acceleration, phase = self._of_the_tick(reference, rows, ticks)
+        if acceleration is not None and phase is not None:
+            curvature = self.spec.regulator.profile_curvature(phase)
             curvature *= turn / reference.duration[rows, None] ** 2
             acceleration[..., 1::3] += curvature[..., None]
         tape = Tape(
@@ -228,6 +241,7 @@ class Controller:
             velocity,
             reference.ticks[rows],
             acceleration=acceleration,
+            phase=phase,
         )
         return tape, record
 

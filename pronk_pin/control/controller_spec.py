@@ -14,7 +14,6 @@ from .._checks import (
     keep_reals,
     known_name,
     sequence_of,
-    shown,
     text,
     whole,
 )
@@ -33,7 +32,13 @@ from .learning import (
     known_law,
 )
 from .signals import ContactDetector, FlightTiming, Gains, ZeroPhaseFilter
-from .torque_control import ComputedTorque, TorqueLaw, WholeBodyQP
+from .tick_control import (
+    BindableTickController,
+    ComputedTorque,
+    TickController,
+    WholeBodyQP,
+    known_tick_controller,
+)
 
 SOURCES = ("none", "model", "library", "identified")
 """Sources of a controller's initial feedforward."""
@@ -70,8 +75,8 @@ class ControllerSpec:
         timing: Adaptation of the flight's duration to the measured one; None plays it as planned.
             Without a law, and where no duration is given, it adapts from the first stride on.
         gains: Feedback gains: eq. (9).
-        torque_law: Law that computes the torques at every tick, in place of the feedback gains and
-            the feedforward; None for these.
+        tick_controller: What computes the torques tick by tick, in place of the feedback gains, see
+            `TickController`; None for these.
         regulator: Speed regulation: eq. (12).
         balance: Attitude and foot placement where the trunk is free to turn.
         selection: Strides worth learning from.
@@ -94,7 +99,7 @@ class ControllerSpec:
     guard: LearningGuard | None = None
     timing: FlightTiming | None = None
     gains: Gains = field(default_factory=Gains)
-    torque_law: TorqueLaw | None = None
+    tick_controller: TickController | BindableTickController | None = None
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
     balance: BalanceSpec = field(default_factory=BalanceSpec)
     selection: StrideSelection = field(default_factory=StrideSelection)
@@ -121,14 +126,12 @@ class ControllerSpec:
         flag(f"{prefix}imu", self.imu)
         for name in ("law", "flight_law"):
             known_law(prefix + name, getattr(self, name))
-        if self.torque_law is not None and not callable(getattr(self.torque_law, "bind", None)):
+        known_tick_controller(f"{prefix}tick_controller", self.tick_controller)
+        computes = isinstance(self.tick_controller, ComputedTorque)
+        if computes and (self.source != "none" or any(self.laws)):
             raise InvalidInput(
-                f"{prefix}torque_law={shown(self.torque_law)} is no torque law; give an object "
-                "with bind(context), such as ComputedTorque(), or None"
-            )
-        if self.torque_law is not None and (self.source != "none" or any(self.laws)):
-            raise InvalidInput(
-                f"{prefix}a torque law plays no feedforward; leave out source, law and flight_law"
+                f"{prefix}{type(self.tick_controller).__name__} plays no feedforward; leave out "
+                "source, law and flight_law"
             )
         if self.timing is not None:
             instance_of(f"{prefix}timing", self.timing, FlightTiming, "a FlightTiming, or None")
@@ -171,11 +174,11 @@ _STIFF = Gains(kp=(140.0, 240.0, 360.0), kd=(2.0, 12.0, 4.0))
 
 _COMPUTED_TORQUE = ControllerSpec(
     "computed-torque",
-    torque_law=ComputedTorque(),
+    tick_controller=ComputedTorque(),
     timing=FlightTiming(),
     knows=("urdf", "rotors", "foot forces"),
 )
-_WHOLE_BODY_QP = replace(_COMPUTED_TORQUE, name="whole-body-qp", torque_law=WholeBodyQP())
+_WHOLE_BODY_QP = replace(_COMPUTED_TORQUE, name="whole-body-qp", tick_controller=WholeBodyQP())
 
 CONTROLLERS = {
     spec.name: spec
@@ -232,7 +235,7 @@ CONTROLLERS = {
         replace(
             _COMPUTED_TORQUE,
             name="computed-torque-cautious",
-            torque_law=ComputedTorque(omega=60.0),
+            tick_controller=ComputedTorque(omega=60.0),
         ),
         replace(_COMPUTED_TORQUE, name="computed-torque+rotors", gait_model="datasheet"),
         replace(_WHOLE_BODY_QP, name="whole-body-qp+rotors", gait_model="datasheet"),

@@ -12,7 +12,7 @@ def test_what_a_controller_knows_goes_with_what_it_is_computed_from() -> None:
     feet's forces too; gaits of the datasheet know the rotors; practice nothing."""
     for spec in CONTROLLERS.values():
         assert set(spec.knows) <= set(KNOWLEDGE)
-        if spec.torque_law is not None:
+        if spec.tick_controller is not None:
             assert spec.knows == ("urdf", "rotors", "foot forces")
             continue
         assert ("urdf" in spec.knows) == (spec.source in ("model", "identified"))
@@ -29,9 +29,9 @@ def test_unknown_knowledge_and_gaits_are_refused() -> None:
         ControllerSpec("mine", gait_model="mine")
     with pytest.raises(InvalidInput, match="give source='identified' too"):
         ControllerSpec("mine", gait_model="identified")
-    with pytest.raises(InvalidInput, match=r"torque_law=3 is no torque law; give an object with"):
-        ControllerSpec("mine", torque_law=3)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="tick_controller=3 is no tick controller"):
+        ControllerSpec("mine", tick_controller=3)  # type: ignore[arg-type]
     with pytest.raises(InvalidInput, match="plays no feedforward; leave out source, law"):
-        ControllerSpec("mine", torque_law=ComputedTorque(), source="model")
+        ControllerSpec("mine", tick_controller=ComputedTorque(), source="model")
     with pytest.raises(InvalidInput, match="coupling"):
         ControllerSpec("mine", coupling=1.5)

@@ -21,7 +21,7 @@ from ... import __name__ as _OURS
 from ... import control, robot
 from ..._registry import imported, is_address
 from ..._typing import Array
-from ...control import StrideRecord, feedback, learning, signals, torque_control
+from ...control import StrideRecord, feedback, learning, signals, tick_control
 from ...control.signals import ControlContext
 from ...errors import InvalidInput
 from ...storage import sha256
@@ -32,7 +32,7 @@ Description: TypeAlias = dict[str, Any]
 
 T = TypeVar("T")
 
-_ROOMS = (control, feedback, learning, signals, torque_control, world, robot)
+_ROOMS = (control, feedback, learning, signals, tick_control, world, robot)
 """Where our own classes are looked up, by their names."""
 
 
@@ -75,7 +75,7 @@ def _origin(thing: Any) -> Description:
 class Unloaded:
     """An object of a class from outside, as its description has it: it loads when it is bound.
 
-    It passes for a learning law and for a torque law.
+    It passes for a learning law and for a tick controller.
 
     Attributes:
         description: Its class, by address, the SHA-256 of its module, and its fields.

@@ -4,8 +4,7 @@
 |---|---|---|
 | `ServoPlayback` | the law is affine in the joints' angles and velocities | a phase |
 | `DelayedPlayback` | it would be, but for motors that are late | as many ticks as they are late |
-| `FeedbackPlayback` | else: noise, a speed-torque curve, trunks that may turn | a tick |
-| `TorquePlayback` | a control computes the torques, not tape and gains | a tick |
+| `FeedbackPlayback` | else: noise, a speed-torque curve, turning trunk, tick controller | a tick |
 
 The first two make the same motion as the third, faster.
 """
@@ -18,14 +17,13 @@ import numpy as np
 
 from ..._typing import Array, IntArray
 from ...control import (
-    Aim,
     AttitudeEstimator,
     Balance,
     ControllerSpec,
     Gains,
-    Reading,
+    Observation,
     Tape,
-    TorqueControl,
+    TickLoop,
     TrunkEstimate,
     clip_torque,
 )
@@ -155,8 +153,8 @@ class DelayedPlayback(Playback):
 class FeedbackPlayback(Playback):
     """The feedback is computed tick by tick, from what the sensors say; so is the balance's torque.
 
-    It applies everywhere: where sensors are noisy, motors lose torque with speed, or trunks may
-    turn, it is the only way.
+    It applies everywhere: where sensors are noisy, motors lose torque with speed, trunks may turn,
+    or a tick controller is asked instead, it is the only way.
 
     Args:
         world: The robots.
@@ -164,6 +162,7 @@ class FeedbackPlayback(Playback):
         sensors: Theirs.
         spec: The controller, whose gains act at every tick.
         balance: What keeps a trunk up that may turn; None where it is locked.
+        tick_loop: What asks a tick controller, in place of gains and balance; None without one.
         ticks: Length of the longest tape.
     """
 
@@ -175,10 +174,12 @@ class FeedbackPlayback(Playback):
         spec: ControllerSpec,
         *,
         balance: Balance | None,
+        tick_loop: TickLoop | None = None,
         ticks: int,
     ) -> None:
         self._world, self._motors, self._sensors = world, motors, sensors
-        self._gains, self._balance = spec.gains, balance
+        self._gains, self._balance, self._tick_loop = spec.gains, balance, tick_loop
+        self._load = np.zeros(world.force.shape[:2])  # as measured in the tick before
         self._inertial = None  # without one the trunk's true state is known
         if balance is not None and spec.imu:
             scenario = world.scenario
@@ -201,15 +202,11 @@ class FeedbackPlayback(Playback):
         """See `Playback`."""
         rows, tick, world = segment.rows, segment.tick, self._world
         joints, rates = self._sensors.encoders(rows, world.joints[rows], world.joint_rates[rows])
-        tape = segment.tape
-        feedback = self._gains.feedback(tape.position[:, 0] - joints, tape.velocity[:, 0] - rates)
-        trunk = None
-        if self._balance is not None:
-            trunk = self._estimated_trunk(rows)
-            balance = self._balance_torque(self._balance, segment, trunk, joints)
-            self.sensed.balance[rows, tick] = balance
-            feedback = feedback + balance
-        torque = clip_torque(feedback, tape.feedforward[:, 0], world.robot.tau_max)
+        trunk = None if self._balance is None else self._estimated_trunk(rows)
+        if self._tick_loop is not None:
+            torque = self._answer(self._tick_loop, segment, trunk, joints, rates)
+        else:
+            torque = self._feedback(segment, trunk, joints, rates)
         torque = self._motors.drive(rows, torque, world.joint_rates[rows])
         motion = world.play(rows, torque[:, None])
         measured = motion._replace(
@@ -217,6 +214,7 @@ class FeedbackPlayback(Playback):
             joint_rates=rates[:, None],
             force=self._sensors.feet(rows, motion.force),
         )
+        self._load[rows] = measured.force[:, 0, :, 2]
         if trunk is not None:
             measured = measured._replace(pose=trunk.pose[:, None], twist=trunk.twist[:, None])
             if self._inertial is not None:
@@ -226,6 +224,52 @@ class FeedbackPlayback(Playback):
 
     def advanced(self, segment: Segment, motion: Motion, ticks: IntArray) -> None:
         """Nothing is left to do: motors were told their torques before."""
+
+    def _feedback(
+        self, segment: Segment, trunk: TrunkEstimate | None, joints: Array, rates: Array
+    ) -> Array:
+        """Torques of gains, balance and feedforward, within their limits [N m], shape (m, 12)."""
+        tape = segment.tape
+        feedback = self._gains.feedback(tape.position[:, 0] - joints, tape.velocity[:, 0] - rates)
+        if self._balance is not None and trunk is not None:
+            balance = self._balance_torque(self._balance, segment, trunk, joints)
+            self.sensed.balance[segment.rows, segment.tick] = balance
+            feedback = feedback + balance
+        return clip_torque(feedback, tape.feedforward[:, 0], self._world.robot.tau_max)
+
+    def _answer(
+        self,
+        tick_loop: TickLoop,
+        segment: Segment,
+        trunk: TrunkEstimate | None,
+        joints: Array,
+        rates: Array,
+    ) -> Array:
+        """Torques of the tick controller, which go into the log here: no tape tells them."""
+        rows, tick, tape = segment.rows, segment.tick, segment.tape
+        assert tape.acceleration is not None  # the controller has written both for it
+        assert tape.phase is not None
+        observation = Observation(
+            rows,
+            segment.part,
+            tick,
+            tape.phase[:, 0],
+            joints,
+            rates,
+            self._load[rows],
+            trunk,
+            tape.position[:, 0],
+            tape.velocity[:, 0],
+            tape.acceleration[:, 0],
+            tape.feedforward[:, 0],
+            tick_loop.previous[rows],
+        )
+        wanted = tick_loop.torque(observation)
+        torque = tick_loop.previous[rows]
+        self.sensed.feedforward[rows, tick] = observation.feedforward
+        self.sensed.feedback[rows, tick] = wanted - observation.feedforward
+        self.sensed.missing[rows, tick] = torque - wanted
+        return torque
 
     def _estimated_trunk(self, rows: IntArray) -> TrunkEstimate:
         """Estimated state of trunks that may turn: by the IMU, or without one the true state."""
@@ -246,59 +290,3 @@ class FeedbackPlayback(Playback):
             return np.zeros_like(joints)
         position = segment.tape.position[:, 0]
         return balance.torque(segment.part, segment.rows, segment.tick, trunk[:2], joints, position)
-
-
-class TorquePlayback(Playback):
-    """A control computes the torques tick by tick, from joints and feet, a contact a tick late.
-
-    Args:
-        world: The robots.
-        motors: Theirs.
-        sensors: Theirs.
-        control: Computes the torques.
-        ticks: Length of the longest tape.
-    """
-
-    def __init__(
-        self,
-        world: World,
-        motors: Motors,
-        sensors: SensorSuite,
-        control: TorqueControl,
-        *,
-        ticks: int,
-    ) -> None:
-        self._world, self._motors, self._sensors = world, motors, sensors
-        self._control = control
-        self.sensed = TickLog(world.n, ticks, turns=False)
-        self._load = np.zeros(world.force.shape[:2])  # as measured in the tick before
-
-    def next_stop(self, rows: IntArray, tick: int, part: int | None) -> int:
-        """See `Playback`."""
-        return tick + 1
-
-    def play(self, segment: Segment) -> Played:
-        """See `Playback`."""
-        rows, tick, tape, world = segment.rows, segment.tick, segment.tape, self._world
-        joints, rates = self._sensors.encoders(rows, world.joints[rows], world.joint_rates[rows])
-        reading = Reading(joints, rates, self._load[rows])
-        acceleration = np.zeros_like(joints)
-        if tape.acceleration is not None:
-            acceleration = tape.acceleration[:, 0]
-        aim = Aim(tape.position[:, 0], tape.velocity[:, 0], acceleration)
-        torque = self._control.torque(segment.part, rows, tick, aim, reading)
-        self.sensed.feedback[rows, tick] = torque
-        self.sensed.feedforward[rows, tick] = self.sensed.missing[rows, tick] = 0.0
-        torque = self._motors.drive(rows, torque, world.joint_rates[rows])
-        motion = world.play(rows, torque[:, None])
-        measured = motion._replace(
-            joints=joints[:, None],
-            joint_rates=rates[:, None],
-            force=self._sensors.feet(rows, motion.force),
-        )
-        self._load[rows] = measured.force[:, 0, :, 2]
-        self.sensed.write(rows, tick, measured)
-        return Played(motion, measured)
-
-    def advanced(self, segment: Segment, motion: Motion, ticks: IntArray) -> None:
-        """Nothing is left to do: motors were told their torques before."""

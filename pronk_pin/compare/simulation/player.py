@@ -13,7 +13,7 @@ from ...control import (
     ControllerSpec,
     PhaseLog,
     Tape,
-    TorqueControl,
+    TickLoop,
     TouchdownDetector,
 )
 from ...gait import Gait
@@ -27,7 +27,6 @@ from .playback import (
     Playback,
     Segment,
     ServoPlayback,
-    TorquePlayback,
 )
 
 
@@ -45,7 +44,7 @@ class Player:
         rng: Source of the sensors' noise.
         base: How the trunks may move, see `build_model`.
         balance: What keeps a trunk up that may turn; None where it is locked.
-        torque_control: What computes torques at every tick; None where tapes and gains do.
+        tick_loop: What asks the tick controller; None where tapes and gains make the torques.
         chunked: Play many ticks at once where that is possible; the motion is the same.
 
     Attributes:
@@ -69,12 +68,12 @@ class Player:
         rng: np.random.Generator,
         base: str,
         balance: Balance | None,
-        torque_control: TorqueControl | None = None,
+        tick_loop: TickLoop | None = None,
         chunked: bool,
     ) -> None:
         n, level = len(gaits), balance is None
         known = chunked and level and scenario.foreseeable  # torques, before they act
-        known &= torque_control is None
+        known &= tick_loop is None
         servo = spec.gains if known and scenario.affine else None
         self.world = World(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
@@ -93,16 +92,18 @@ class Player:
             self._playback = ServoPlayback(self.world, servo, self.log, flight)
         elif known and scenario.delay_ticks:
             self._playback = DelayedPlayback(self.world, self.motors, spec.gains, self.log)
-        elif torque_control is not None:
-            self._playback = TorquePlayback(
-                self.world, self.motors, self.sensors, torque_control, ticks=ticks
-            )
         else:
             self._playback = FeedbackPlayback(
-                self.world, self.motors, self.sensors, spec, balance=balance, ticks=ticks
+                self.world,
+                self.motors,
+                self.sensors,
+                spec,
+                balance=balance,
+                tick_loop=tick_loop,
+                ticks=ticks,
             )
         self.sensed = self._playback.sensed
-        self._gains, self._balance = spec.gains, balance
+        self._gains, self._balance, self._tick_loop = spec.gains, balance, tick_loop
         self._level_imu = spec.imu and level  # read a phase at a time
         self.late = np.full(n, spec.touchdown_ticks, dtype=np.intp)
         self._touchdown = TouchdownDetector(
@@ -149,7 +150,7 @@ class Player:
             )
             played = np.maximum(played, 1 + self.late[rows])  # even if it broke before
         tau_max = self.world.robot.tau_max
-        if not isinstance(playback, TorquePlayback):  # its torques do not follow from the tape
+        if self._tick_loop is None:  # else they are in the log
             sensed.torques(rows, tape, self._gains, tau_max, int(played.max()))
         if sensed is not log:
             log.take_torques(rows, sensed)
@@ -189,6 +190,8 @@ class Player:
         broken = rows[self.falls.broken(self.world.state[rows])]
         if broken.size:
             self.world.restart(broken)
+            if self._tick_loop is not None:
+                self._tick_loop.restart(broken)
             self.upright[broken] = False
 
     def measured(self, rows: IntArray, length: IntArray, *, sensed: int = 0) -> PhaseLog:
@@ -217,11 +220,11 @@ class Player:
 def _excerpt(tape: Tape, rows: IntArray, ticks: slice) -> Tape:
     """Tapes of some of the robots at some of the ticks."""
     at = rows, ticks
-    acceleration = None if tape.acceleration is None else tape.acceleration[at]
     return Tape(
         tape.feedforward[at],
         tape.position[at],
         tape.velocity[at],
         tape.length[rows],
-        acceleration=acceleration,
+        acceleration=None if tape.acceleration is None else tape.acceleration[at],
+        phase=None if tape.phase is None else tape.phase[at],
     )

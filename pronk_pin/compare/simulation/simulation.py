@@ -96,7 +96,7 @@ class Simulation:
             rng=rng.spawn(1)[0],
             base=base,
             balance=self.controller.balance,
-            torque_control=self.controller.torque_control,
+            tick_loop=self.controller.tick_loop,
             chunked=chunked,
         )
         self.world, self.upright = self.player.world, self.player.upright
@@ -167,8 +167,12 @@ class Simulation:
         learning &= any(law is not None for law in controller.spec.laws)
         strides.begin(rows, self._seconds(start), learning, remaining=self._seconds(steps - start))
 
-        stance = player.play(rows, controller.touchdown(rows, learning, late=late), part=0)
-        tape, record = controller.liftoff(rows, player.measured(rows, stance, sensed=late))
+        with controller.time.measured():
+            tape = controller.touchdown(rows, learning, late=late)
+        stance = player.play(rows, tape, part=0)
+        measured_log = player.measured(rows, stance, sensed=late)
+        with controller.time.measured():
+            tape, record = controller.liftoff(rows, measured_log)
         if player.sensed is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, sensed=late))
         strides.stance(rows, record, log, stance)
@@ -180,7 +184,8 @@ class Simulation:
         duration, upright = self._seconds(stance + flight), self.upright[rows]
         tilt = np.maximum(tilt, player.tilt(1, rows, flight))
         measured_log = player.measured(rows, flight)
-        record = controller.landing(rows, measured_log, duration, upright)
+        with controller.time.measured():
+            record = controller.landing(rows, measured_log, duration, upright)
         if player.sensed is not log:
             record = controller.record(1, rows, log.phase(rows, flight))
         strides.flight(rows, record, log, flight)

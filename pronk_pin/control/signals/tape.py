@@ -71,8 +71,9 @@ class Tape:
         length: Ticks after which each robot's phase ends at the latest, shape (n,): more than are
             on the tape, where the last of them is to be held, see `held`.
         begin: Tick at which to begin; those before have passed already.
-        acceleration: Reference joint accelerations [rad/s^2], shape (n, ticks, 12), for a control
-            that computes torques at every tick; None for others.
+        acceleration: Reference joint accelerations [rad/s^2], shape (n, ticks, 12), for a tick
+            controller; None for others.
+        phase: Phase of the reference, shape (n, ticks), likewise.
     """
 
     feedforward: Array
@@ -81,6 +82,7 @@ class Tape:
     length: IntArray
     begin: int = 0
     acceleration: Array | None = None
+    phase: Array | None = None
 
     @property
     def ticks(self) -> int:
@@ -104,6 +106,7 @@ class Tape:
             position=self.position[:, index],
             velocity=self.velocity[:, index],
             acceleration=None if self.acceleration is None else self.acceleration[:, index],
+            phase=None if self.phase is None else self.phase[:, index],
         )
 
     def setpoint(self, gains: Gains) -> Array:

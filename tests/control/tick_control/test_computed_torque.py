@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin._typing import Array
+from pronk_pin._typing import Array, IntArray
 from pronk_pin.compare import Schedule, Simulation, load_scenario
 from pronk_pin.control import (
     PARTS,
-    Aim,
     ComputedTorque,
     Controller,
     ControllerSpec,
-    Reading,
-    TorqueControl,
+    Observation,
+    TickLoop,
     load_controller,
     model_feedforward,
 )
@@ -33,15 +33,46 @@ TICKS = (5, 60, 130)
 """Ticks early, in the middle and late in both parts."""
 
 
+class Aim(NamedTuple):
+    """What the joints should do."""
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+
+class Reading(NamedTuple):
+    """What is measured."""
+
+    joints: Array
+    joint_rates: Array
+    load: Array
+
+
+class Asked:
+    """A tick controller, asked tick by tick for motor torques within their limits."""
+
+    def __init__(self, loop: TickLoop) -> None:
+        self.loop = loop
+
+    def torque(self, part: int, rows: IntArray, tick: int, aim: Aim, reading: Reading) -> Array:
+        m = len(rows)
+        none = np.zeros((m, 12))
+        self.loop.torque(
+            Observation(rows, part, tick, np.zeros(m), *reading, None, *aim, none, none)
+        )
+        return self.loop.previous[rows]
+
+
 @pytest.fixture(scope="module")
-def control(robot: Robot, gaits: list[Gait]) -> TorqueControl:
+def control(robot: Robot, gaits: list[Gait]) -> Asked:
     return bound(robot, gaits, load_controller("computed-torque"))
 
 
-def bound(robot: Robot, gaits: list[Gait], spec: ControllerSpec) -> TorqueControl:
-    control = Controller(robot, gaits, spec, timestep=DT).torque_control
-    assert control is not None
-    return control
+def bound(robot: Robot, gaits: list[Gait], spec: ControllerSpec) -> Asked:
+    loop = Controller(robot, gaits, spec, timestep=DT).tick_loop
+    assert loop is not None
+    return Asked(loop)
 
 
 def reference(gaits: list[Gait], part: int, tick: int) -> Aim:
@@ -79,7 +110,7 @@ def planned(robot: Robot, gaits: list[Gait], part: int, tick: int, change: Array
 
 @pytest.mark.parametrize("part", [0, 1])
 def test_on_the_reference_the_torque_is_the_models_feedforward(
-    robot: Robot, gaits: list[Gait], control: TorqueControl, part: int
+    robot: Robot, gaits: list[Gait], control: Asked, part: int
 ) -> None:
     """In flight but for the polynomials of the trunk, which fall within 0.1 m/s^2 of gravity's."""
     model, rows = with_rotors(robot), np.arange(len(gaits))
@@ -93,7 +124,7 @@ def test_on_the_reference_the_torque_is_the_models_feedforward(
 
 @pytest.mark.parametrize("tick", TICKS)
 def test_in_flight_the_torque_moves_the_legs_below_a_trunk_that_falls(
-    robot: Robot, gaits: list[Gait], control: TorqueControl, tick: int
+    robot: Robot, gaits: list[Gait], control: Asked, tick: int
 ) -> None:
     """Forward dynamics of the falling robot give the accelerations of the reference back."""
     model, rows = with_rotors(robot), np.arange(len(gaits))
@@ -129,7 +160,7 @@ def test_on_the_reference_of_gaits_with_rotors_it_is_what_their_controller_plays
 
 @pytest.mark.parametrize("tick", TICKS)
 def test_an_error_in_flight_gives_the_torque_that_takes_it_away(
-    robot: Robot, gaits: list[Gait], control: TorqueControl, tick: int
+    robot: Robot, gaits: list[Gait], control: Asked, tick: int
 ) -> None:
     """The change of torque moves the joint alone, by omega^2 e: M_eff is that of a free trunk."""
     rows, model = np.arange(len(gaits)), with_rotors(robot)
@@ -157,7 +188,7 @@ def effective_mass(model: Robot, joints: Array) -> Array:
 
 @pytest.mark.parametrize("tick", TICKS)
 def test_an_error_in_stance_gives_the_torque_of_the_wanted_acceleration(
-    robot: Robot, gaits: list[Gait], control: TorqueControl, tick: int
+    robot: Robot, gaits: list[Gait], control: Asked, tick: int
 ) -> None:
     """All feet wide by a joint ask the trunk to go where these legs would carry it."""
     rows, model = np.arange(len(gaits)), with_rotors(robot)
@@ -188,7 +219,7 @@ def feet_by_joints(robot: Robot, joints: Array) -> Array:
 
 
 def test_torques_keep_to_the_motors_limits_and_failed_sensors_reach_none(
-    robot: Robot, gaits: list[Gait], control: TorqueControl
+    robot: Robot, gaits: list[Gait], control: Asked
 ) -> None:
     aim, rows = reference(gaits, 0, 60), np.arange(len(gaits))
     far = on(aim._replace(position=aim.position + 0.5), 0)
@@ -200,7 +231,7 @@ def test_torques_keep_to_the_motors_limits_and_failed_sensors_reach_none(
     assert np.isfinite(control.torque(0, rows, 60, aim, broken)).all()
 
 
-def test_feet_that_feel_no_load_carry_nothing(gaits: list[Gait], control: TorqueControl) -> None:
+def test_feet_that_feel_no_load_carry_nothing(gaits: list[Gait], control: Asked) -> None:
     """Without any the torque is that of the flight, whatever the schedule says."""
     aim, rows = reference(gaits, 0, 60), np.arange(len(gaits))
     reading = on(aim, 0)._replace(load=np.full((len(gaits), 4), 4.0))
@@ -223,8 +254,8 @@ def test_in_closed_loop_robots_stay_up_and_track_twice_as_well_as_with_the_model
 ) -> None:
     """Where motors are late, after some ten strides in which the flights find their duration."""
     spec, library = load_controller(name), load_library("a1")
-    assert isinstance(spec.torque_law, ComputedTorque)
-    spec = replace(spec, torque_law=replace(spec.torque_law, omega=omega))
+    assert isinstance(spec.tick_controller, ComputedTorque)
+    spec = replace(spec, tick_controller=replace(spec.tick_controller, omega=omega))
     gaits = [library.at(speed) for speed in (-0.3, 0.3)]
     model = calf_peaks(robot, gaits, load_controller("model"), scenario)
     if spec.gait_model == "datasheet":

@@ -23,8 +23,9 @@ from ..._checks import Interval, keep_reals
 from ..._typing import Array, BoolArray
 from ...inverse_dynamics import cone_sides
 from ..signals import ControlContext
-from .computed_torque import ComputedTorque, ComputedTorqueControl, State, TorqueControl
+from .computed_torque import ComputedTorque, ComputedTorqueControl, State
 from .level_robot import TRUNK, LevelRobot, cheapest_forces
+from .tick_controller import TickController
 
 _TORQUE_WEIGHT = 1e-6
 """Cost of torques against missed accelerations [1/(kg m^2)]: it decides among internal forces."""
@@ -50,7 +51,7 @@ class WholeBodyQP(ComputedTorque):
         super().__post_init__()
         keep_reals(self, {"friction": Interval(0, 10, above=True)}, "whole-body QP: ")
 
-    def bind(self, context: ControlContext) -> TorqueControl:
+    def bind(self, context: ControlContext) -> TickController:
         """See `ComputedTorque.bind`."""
         return WholeBodyQPControl(self, context)
 

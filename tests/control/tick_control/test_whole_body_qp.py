@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pronk_pin._typing import Array
-from pronk_pin.control.torque_control.computed_torque import State
-from pronk_pin.control.torque_control.level_robot import TRUNK, LevelRobot, cheapest_forces
-from pronk_pin.control.torque_control.whole_body_qp import Terms, WholeBodyQP, solve
+from pronk_pin.control.tick_control.computed_torque import State
+from pronk_pin.control.tick_control.level_robot import TRUNK, LevelRobot, cheapest_forces
+from pronk_pin.control.tick_control.whole_body_qp import Terms, WholeBodyQP, solve
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import Gait
 from pronk_pin.robot import Robot, with_rotors

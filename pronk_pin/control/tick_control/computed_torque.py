@@ -20,68 +20,23 @@ clipping only, and to no friction cone: see `whole_body_qp`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from ..._checks import Interval, keep_reals
-from ..._typing import Array, BoolArray, IntArray
+from ..._typing import Array, BoolArray
 from ...errors import InvalidInput
 from ...gait import Gait
 from ...robot import Robot, with_rotors
 from ..signals import ControlContext
 from .level_robot import TRUNK, LevelRobot, cheapest_forces
+from .tick_controller import Observation, TickController
 
 _CHECKS = {
     "omega": Interval(0, 1000, "1/s", above=True),
     "least_load": Interval(0, 1000, "N", above=True),
 }
-
-
-class Reading(NamedTuple):
-    """What m robots measure at a tick."""
-
-    joints: Array
-    """Joint angles [rad], shape (m, 12)."""
-    joint_rates: Array
-    """Joint velocities [rad/s], shape (m, 12)."""
-    load: Array
-    """Ground's force on each foot, upward [N], shape (m, 4)."""
-
-
-class Aim(NamedTuple):
-    """Reference of m robots' joints at a tick."""
-
-    position: Array
-    """Joint angles [rad], shape (m, 12)."""
-    velocity: Array
-    """Joint velocities [rad/s], shape (m, 12)."""
-    acceleration: Array
-    """Joint accelerations [rad/s^2], shape (m, 12)."""
-
-
-class TorqueControl(Protocol):
-    """Computes motor torques at every tick, from what is measured."""
-
-    def torque(
-        self, part: int | None, rows: IntArray, tick: int, aim: Aim, reading: Reading
-    ) -> Array:
-        """Motor torques within their limits [N m], shape (m, 12).
-
-        Args:
-            part: Part of the stride, an index into `PARTS`; None for the start-up.
-            rows: Which robots, shape (m,).
-            tick: Tick of that part.
-            aim: What their joints should do.
-            reading: What they measure.
-        """
-
-
-class TorqueLaw(Protocol):
-    """Settings of a torque control."""
-
-    def bind(self, context: ControlContext) -> TorqueControl:
-        """The control of the robots of a context."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +55,8 @@ class ComputedTorque:
     def __post_init__(self) -> None:
         keep_reals(self, _CHECKS, "computed torque: ")
 
-    def bind(self, context: ControlContext) -> TorqueControl:
-        """See `TorqueLaw`.
+    def bind(self, context: ControlContext) -> TickController:
+        """The tick controller of the robots of a context.
 
         Raises:
             InvalidInput: The trunk is not locked, or the rotors of the robot are not known.
@@ -109,7 +64,7 @@ class ComputedTorque:
         return ComputedTorqueControl(self, context)
 
 
-class ComputedTorqueControl(TorqueControl):
+class ComputedTorqueControl(TickController):
     """Computed torque of n robots.
 
     Args:
@@ -132,23 +87,21 @@ class ComputedTorqueControl(TorqueControl):
             [_trunk_acceleration(gait, context) for gait in context.gaits]
         )  # (n, ticks, 2)
 
-    def torque(
-        self, part: int | None, rows: IntArray, tick: int, aim: Aim, reading: Reading
-    ) -> Array:
-        """See `TorqueControl`."""
-        joints, rates = reading.joints, reading.joint_rates
-        standing = reading.load > self._least_load
+    def command(self, observation: Observation) -> Array:
+        """See `TickController`."""
+        joints, rates, part = observation.joints, observation.joint_rates, observation.part
+        standing = observation.load > self._least_load
         if part == 1:
             # A foot that has not left the ground yet, or meets it, is to swing all the same.
             standing[:] = False
         levers = self.model.levers(joints) if standing.any() else None
-        error, rate = aim.position - joints, aim.velocity - rates
+        error, rate = observation.position - joints, observation.velocity - rates
         wanted = np.zeros((len(joints), TRUNK + joints.shape[1]))
-        wanted[:, TRUNK:] = aim.acceleration + self._pull(error, rate)
+        wanted[:, TRUNK:] = observation.acceleration + self._pull(error, rate)
         flying = np.flatnonzero(~standing.any(axis=1))
         if levers is not None:
             if part == 0:
-                wanted[:, :TRUNK] = self._trunk[rows, tick]
+                wanted[:, :TRUNK] = self._trunk[observation.rows, observation.tick]
             errors = (_trunk_error(levers, each, standing) for each in (error, rate))
             wanted[:, :TRUNK] += self._pull(*errors)
         if flying.size:
@@ -157,7 +110,7 @@ class ComputedTorqueControl(TorqueControl):
             needed = self.model.forces(joints[flying], rates[flying], wanted[flying])
             wanted[flying, :TRUNK] = -needed[:, :TRUNK] / self.model.robot.mass
         state = State(joints, rates, levers, standing)
-        return self._commanded(self.joint_torque(wanted, state), aim)
+        return self._commanded(self.joint_torque(wanted, state), observation.velocity)
 
     def _pull(self, error: Array, rate: Array) -> Array:
         """Acceleration by which errors die out, critically damped."""
@@ -173,17 +126,15 @@ class ComputedTorqueControl(TorqueControl):
         held = np.einsum("mlij,mli->mlj", state.levers, force)
         return np.asarray(torque - held.reshape(torque.shape))
 
-    def _commanded(self, torque: Array, aim: Aim) -> Array:
-        """Motor torques for torques at the joints, within the limits [N m], shape (m, 12).
+    def _commanded(self, torque: Array, velocity: Array) -> Array:
+        """Motor torques for torques at the joints [N m], shape (m, 12).
 
-        Friction is overcome along the reference's rate: along the measured one it would chatter. A
-        sensor that fails must not reach the motors.
+        Friction is overcome along the reference's rate: along the measured one it would chatter.
         """
         robot: Robot = self.model.robot
         if not robot.parameters.ideal_motors:
-            torque = (torque + robot.friction(aim.velocity)) / robot.parameters.torque_constant
-        torque = np.where(np.isfinite(torque), torque, 0.0)
-        return np.clip(torque, -robot.tau_max, robot.tau_max)
+            torque = (torque + robot.friction(velocity)) / robot.parameters.torque_constant
+        return torque
 
 
 class State(NamedTuple):
