@@ -223,8 +223,8 @@ class Experiment:
         return load_controller(_find(self.controllers, name))
 
     def scenario(self, name: str) -> Scenario:
-        """The scenario of a name, in the experiment's MJCF if it has one."""
-        return load_scenario(_find(self.scenarios, name), mjcf=self.mjcf)
+        """The scenario of a name."""
+        return load_scenario(_find(self.scenarios, name))
 
     @property
     def model(self) -> Robot:
@@ -389,8 +389,8 @@ class Cell:
 
     @property
     def world(self) -> Scenario:
-        """Its scenario."""
-        return self.experiment.scenario(self.scenario)
+        """Its scenario, in the experiment's MJCF if it has one."""
+        return load_scenario(self.experiment.scenario(self.scenario), mjcf=self.experiment.mjcf)
 
     @property
     def alone(self) -> Experiment:
