@@ -46,8 +46,8 @@ class Compare:
     config: Path | None = None
     """Experiment in a YAML file, or the config.json of a result, which the other options change."""
     suite: str = "default"
-    """A named experiment, which the other options change: default, mismatch, sampled, control,
-    paper."""
+    """A named experiment, which the other options change: see `pronk-pin list
+    suites`."""
     folder: Path | None = None
     """Results folder; by default results/<time>-comparison."""
     workers: int | None = None
@@ -72,6 +72,9 @@ class Compare:
         )
         print(f"robot {results.experiment.robot_name}, base {results.experiment.base}\n")
         print(format_summary(results.summary()))
+        times = ", ".join(f"{name} {time:.3g}" for name, time in results.control_times.items())
+        if times:
+            print(f"\ntime that controllers took on this machine, a robot and tick [us]: {times}")
         _write_pages(results)
 
 

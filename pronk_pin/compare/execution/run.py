@@ -23,6 +23,7 @@ from tqdm import tqdm
 
 from ..._checks import instance_of, path, worker_count
 from ..._workers import count_steps
+from ...control import ControlTime
 from ...errors import FileProblem, WorkerLost
 from ..experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
 from ..metrics import CellSummary, join_summaries, summarize_cell
@@ -185,6 +186,8 @@ class FinishedCell(NamedTuple):
     """What it gives to the summary."""
     simulation: float
     """How long the simulation took [s]."""
+    control: float
+    """How long the controller took of that, a robot and tick [us]."""
     encoding: float
     """How long it took to make the file of it [s]."""
     summarizing: float
@@ -276,6 +279,7 @@ class _Run:
         self.missing.discard(cell)
         self._record["cells"][cell.name] = {
             "simulation_s": round(finished.simulation, 2),
+            "control_us_per_tick": round(finished.control, 2),
             "encoding_s": round(finished.encoding, 2),
             "summary_s": round(finished.summarizing, 2),
         }
@@ -300,14 +304,15 @@ def _make(cell: Cell, dependency: xr.Dataset | None, progress: Progress) -> Fini
     # BLAS with several threads may add in another order, and workers side by side need no more.
     with _one_at_a_time, threadpool_limits(1):
         times = [time.perf_counter()]
-        strides = run_cell(cell, dependency, progress)
+        control_time = ControlTime()
+        strides = run_cell(cell, dependency, progress, control_time)
         times.append(time.perf_counter())
         data = encode(strides)
         times.append(time.perf_counter())
         summary = summarize_cell(strides)
         times.append(time.perf_counter())
     simulation, encoding, summarizing = (after - before for before, after in pairwise(times))
-    return FinishedCell(data, summary, simulation, encoding, summarizing)
+    return FinishedCell(data, summary, simulation, control_time.per_tick, encoding, summarizing)
 
 
 def _work(cell: Cell, dependency: xr.Dataset | None) -> FinishedCell:

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..._checks import instance_of
+from ...control import ControlTime
 from ...gait import replan
 from ...robot import robot_attributes, with_rotors
 from ..identification import explain
@@ -16,7 +17,10 @@ from .initial_feedforward import initial_feedforward, learned_strides
 
 
 def run_cell(
-    cell: Cell, dependency: xr.Dataset | None = None, progress: Progress | None = None
+    cell: Cell,
+    dependency: xr.Dataset | None = None,
+    progress: Progress | None = None,
+    control_time: ControlTime | None = None,
 ) -> xr.Dataset:
     """Simulate a cell.
 
@@ -24,6 +28,7 @@ def run_cell(
         cell: Its description.
         dependency: The strides of `cell.depends_on`, where there is such a cell.
         progress: Called with the number of time steps done since the last call.
+        control_time: Takes how long the controller computed.
 
     Returns:
         The strides: see `compare.simulation.dataset`.
@@ -50,6 +55,7 @@ def run_cell(
         base=base,
         attributes=_attributes(cell),
         progress=progress,
+        control_time=control_time,
     )
 
 

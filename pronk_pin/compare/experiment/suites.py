@@ -13,10 +13,13 @@ from .experiment import Experiment
 
 _FOUR_SPEEDS = (-0.4, 0.0, 0.4, 0.8)
 
+_EIGHT_SPEEDS = (-0.5, -0.3, -0.1, 0.1, 0.3, 0.5, 0.7, 0.8)
+"""As many units as an interval takes."""
+
 SUITES: Mapping[str, Mapping[str, Any]] = {
     "default": {},
     "knowledge": {
-        "speeds": _FOUR_SPEEDS,
+        "speeds": _EIGHT_SPEEDS,
         "controllers": ("pd", "ilc", "ilc+rotors", "model", "model+rotors", "identified+gait"),
         "scenarios": (
             *("nominal", "ideal", "payload", "weak-motors", "delay"),

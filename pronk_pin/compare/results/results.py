@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import xarray as xr
 
@@ -128,6 +129,20 @@ class Results:
             FileProblem: It is damaged.
         """
         return read_provenance(self.folder)
+
+    @property
+    def control_times(self) -> dict[str, float]:
+        """Time that each controller computed a robot and tick [us], the median of its cells.
+
+        Of those whose provenance is there.
+        """
+        times: dict[str, list[float]] = {}
+        made = {name: one for run in self.provenance["runs"] for name, one in run["cells"].items()}
+        for cell in self.experiment.cells():
+            if "control_us_per_tick" in made.get(cell.name, {}):
+                found = float(made[cell.name]["control_us_per_tick"])
+                times.setdefault(cell.controller, []).append(found)
+        return {name: float(np.median(values)) for name, values in times.items()}
 
     def write_provenance(self, provenance: Mapping[str, Any]) -> None:
         """Write provenance.json."""

@@ -15,7 +15,7 @@ import xarray as xr
 
 from ..._checks import Interval, flag, instance_of, known_name, whole
 from ..._typing import Array, IntArray
-from ...control import Controller, ControllerSpec, InitialFeedforward
+from ...control import Controller, ControllerSpec, ControlTime, InitialFeedforward
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
 from ...robot import BASES, Robot
@@ -147,6 +147,13 @@ class Simulation:
         self.strides.finish(self.upright)
         return self.strides
 
+    @property
+    def control_time(self) -> ControlTime:
+        """How long the controller has computed, at events and at ticks, for how many ticks."""
+        events, loop = self.controller.time, self.controller.tick_loop
+        seconds = events.seconds + (0.0 if loop is None else loop.time.seconds)
+        return ControlTime(seconds, int(self._clock.sum()))
+
     def _startup(self) -> None:
         """Stand; the last ticks are as if the first stance's touchdown had been sensed late."""
         rows, late = np.arange(len(self._gaits)), self.controller.spec.touchdown_ticks
@@ -218,6 +225,7 @@ def simulate(
     base: str = "locked",
     attributes: Mapping[str, str | int | float] | None = None,
     progress: Progress | None = None,
+    control_time: ControlTime | None = None,
 ) -> xr.Dataset:
     """Simulate robots under one controller in one scenario, and label their strides.
 
@@ -232,6 +240,7 @@ def simulate(
         base: How the trunks may move: "locked" to x and z, "sagittal" with pitch, or "free".
         attributes: Attributes of the dataset; by default the name of the robot.
         progress: Called with the number of time steps done since the last call.
+        control_time: Takes how long the controller computed.
 
     Returns:
         The strides, see `to_dataset`.
@@ -249,4 +258,7 @@ def simulate(
         base=base,
     )
     attributes = {"robot": robot.name} if attributes is None else attributes
-    return to_dataset(simulation.run(progress), robot, gaits, attributes=attributes)
+    log = simulation.run(progress)
+    if control_time is not None:
+        control_time.add(simulation.control_time)
+    return to_dataset(log, robot, gaits, attributes=attributes)

@@ -15,6 +15,7 @@ A whole-body QP, model-predictive control, a trained policy, a PD of one's own: 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -139,6 +140,16 @@ class ControlTime:
 
     seconds: float = 0.0
     ticks: int = 0
+
+    @property
+    def per_tick(self) -> float:
+        """Time a robot and tick [us]; NaN before the first."""
+        return 1e6 * self.seconds / self.ticks if self.ticks else math.nan
+
+    def add(self, other: ControlTime) -> None:
+        """Count the time of another controller in."""
+        self.seconds += other.seconds
+        self.ticks += other.ticks
 
     @contextmanager
     def measured(self) -> Iterator[None]:
