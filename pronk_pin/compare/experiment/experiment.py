@@ -92,7 +92,8 @@ class Experiment:
         scenarios: Scenarios by name, composed with "+", values with "=": nominal, ideal,
             payload=2+slope, random-0-3; or a `Scenario` of one's own, or its address; see
             `compare.world.scenario`.
-        seeds: Seeds of the scatter at the start.
+        seeds: Seeds of the scatter at the start, of noise, and of rough ground and steps. Where
+            nothing is random they hardly differ; `rough` is the scenario for many.
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         mjcf: MJCF of the robot, with the same joint names, that stands in for its URDF in the
             simulation; see `compare.world.mjcf`. The scenarios add to what is in it: "ideal" takes
@@ -360,7 +361,7 @@ class Cell:
     Attributes:
         controller: Name of the controller.
         scenario: Name of the scenario.
-        seed: Seed of the scatter at the start.
+        seed: Seed of all that is random.
         batch: Index of the speeds among the experiment's batches.
         experiment: The experiment, with the objects of these names.
     """
@@ -389,8 +390,9 @@ class Cell:
 
     @property
     def world(self) -> Scenario:
-        """Its scenario, in the experiment's MJCF if it has one."""
-        return load_scenario(self.experiment.scenario(self.scenario), mjcf=self.experiment.mjcf)
+        """Its scenario, in the experiment's MJCF if it has one, on ground of its own seed."""
+        world = load_scenario(self.experiment.scenario(self.scenario), mjcf=self.experiment.mjcf)
+        return dataclasses.replace(world, seed=world.seed + self.seed)
 
     @property
     def alone(self) -> Experiment:

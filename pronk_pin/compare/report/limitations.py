@@ -12,6 +12,7 @@ import pandas as pd
 from ...control import SKIPPED
 from ..metrics import CONFIDENCE, LEAST_UNITS, family, robots, sampled, table_1, unit_of
 from ..results import Results
+from ..world import Sensors
 from .tables import SHOWN
 
 _STEADY_APEX = 0.004
@@ -87,14 +88,22 @@ def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:
             "them): intervals over them speak of worlds like these, at the speeds "
             f"{', '.join(f'{speed:g}' for speed in results.experiment.speeds)} m/s."
         )
-    yield (
-        "Seeds differ in the starting posture alone where the world is not sampled and has no "
-        "noise; a steady gait forgets it, and intervals over such seeds are small."
-    )
+    if len(seeds) > 1 and (silent := [name for name in scenarios if not _random(results, name)]):
+        yield (
+            f"In {_listed(silent)} seeds differ in the starting posture alone, which a steady gait "
+            "forgets: they are one run, not a sample. The scenario `rough` is for seeds."
+        )
     yield (
         f"Each interval holds its value with {CONFIDENCE:.0%}; of the {means} mean errors here, "
         f"about {(1 - CONFIDENCE) * means:.0f} intervals miss theirs by chance."
     )
+
+
+def _random(results: Results, scenario: str) -> bool:
+    """Whether anything in a scenario depends on the seed, but for the start."""
+    world = results.experiment.scenario(scenario)
+    uneven = world.ground_roughness > 0.0 or world.step_height > 0.0
+    return uneven or world.touchdown_jitter > 0.0 or world.sensors != Sensors()
 
 
 def _mean_of(

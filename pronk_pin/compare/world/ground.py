@@ -1,9 +1,10 @@
-"""The ground of a world, level or stepped, the feet that meet it, and the friction between them."""
+"""The ground of a world: level, stepped or rough, the feet that meet it, and their friction."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from ..._typing import Array
 from ...robot import Robot
@@ -19,6 +20,15 @@ _FARTHEST = 45.0
 _STEP_WIDTH = 5.0
 """Half the width of a step [m]."""
 
+_CELL = 0.02
+"""Spacing of the heights of rough ground [m]."""
+_CORRELATION = 0.05
+"""Standard deviation of the Gaussian that smooths them [m]: bumps are some 10 cm apart."""
+_PERIOD = 10.0
+"""Distance along the way after which they repeat [m]."""
+_ROUGH_LENGTH, _ROUGH_WIDTH = 100.0, 2.5
+"""Half the length and half the width of rough ground [m]; beyond it is level, at its lowest."""
+
 
 def add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
     """The floor with its steps, the robot's contacts with it, and sensors of the feet's forces.
@@ -33,6 +43,10 @@ def add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
         _set_contact(geom, scenario)
     plane, box = mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_BOX
     ground = [spec.worldbody.add_geom(name=_FLOOR, type=plane, size=[0, 0, 1])]
+    if scenario.ground_roughness > 0.0:
+        heights = rough_heights(scenario)
+        ground[0].pos = [0, 0, heights.min()]
+        ground.append(_add_heights(spec, heights))
     half = 0.5 * scenario.step_length
     for centre, height in zip(*steps(scenario), strict=True):
         size = [half, _STEP_WIDTH, height]  # half of it below the floor
@@ -78,6 +92,32 @@ def steps(scenario: Scenario) -> tuple[Array, Array]:
     rng = np.random.default_rng(scenario.seed)
     heights = scenario.step_height * rng.uniform(size=2 * count)
     return np.column_stack([ahead, -ahead]).ravel(), heights
+
+
+def rough_heights(scenario: Scenario) -> Array:
+    """Heights of rough ground [m], by place across and along the way, the origin in the middle.
+
+    White noise of the scenario's seed, smoothed to a normal height of standard deviation
+    `ground_roughness`; level at the start.
+    """
+    count = round(_PERIOD / _CELL), round(2.0 * _ROUGH_WIDTH / _CELL) + 1
+    noise = np.random.default_rng(scenario.seed).standard_normal(count[::-1])
+    tile = gaussian_filter(noise, _CORRELATION / _CELL, mode="wrap")
+    along = _CELL * np.arange(round(2.0 * _ROUGH_LENGTH / _CELL) + 1) - _ROUGH_LENGTH
+    heights = np.take(tile, np.arange(len(along)) % count[0], axis=1)
+    heights *= scenario.ground_roughness / tile.std()
+    return np.asarray(heights * np.clip(np.abs(along) / _LEVEL - 1.0, 0.0, 1.0))
+
+
+def _add_heights(spec: mujoco.MjSpec, heights: Array) -> mujoco.MjsGeom:
+    """Ground of some heights, about the origin."""
+    low, high = float(heights.min()), float(heights.max())
+    rows, columns = heights.shape
+    size = [_ROUGH_LENGTH, _ROUGH_WIDTH, high - low, 1.0]  # the last: how deep it goes
+    data = ((heights - low) / (high - low)).astype(np.float32).ravel()
+    field = spec.add_hfield(name="rough", nrow=rows, ncol=columns, size=size, userdata=data)
+    kind = mujoco.mjtGeom.mjGEOM_HFIELD
+    return spec.worldbody.add_geom(type=kind, hfieldname=field.name, pos=[0, 0, low])
 
 
 def name_feet(spec: mujoco.MjSpec, robot: Robot) -> None:

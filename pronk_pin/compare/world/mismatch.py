@@ -92,6 +92,12 @@ KNOWN = {
         "s",
         _of("touchdown_jitter"),
     ),
+    "rough": Mismatch(
+        "standard deviation of the ground's height, with half of the noise of `NOISE`",
+        0.002,
+        "m",
+        lambda height: {"ground_roughness": height, "sensors": NOISE.scaled(0.5)},
+    ),
     "push": Mismatch("push forward and back, every 4.1 s", 3.0, "N s", _push),
     "push-side": Mismatch("push to the left and right, every 4.1 s", 1.5, "N s", _side),
 }

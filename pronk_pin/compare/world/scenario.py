@@ -53,6 +53,7 @@ _NUMBERS = {
     "ground_time_constant": Interval(0, 1, "s", above=True),
     "ground_friction": Interval(0, 10, above=True),
     "slope": Interval(-0.5, 0.5, "rad"),  # the gaits are planned on level ground
+    "ground_roughness": Interval(0, 0.05, "m"),
     "step_height": Interval(0, 0.5, "m"),
     "step_length": Interval(0.05, 10, "m"),  # each step is a box in the world
     "gravity": Interval(0, 30, "m/s^2", above=True),
@@ -102,6 +103,7 @@ class Scenario:
         ground_friction: Friction coefficient of the feet on the ground, the mu of their cones; the
             feet's and the ground's are the same. Stored results have this name.
         slope: Slope of the ground, uphill in x where positive [rad].
+        ground_roughness: Standard deviation of the ground's height [m], in bumps some 10 cm apart.
         step_height: Greatest height of the steps across the way [m].
         step_length: Length of a step along the way [m].
         gravity: Gravitational acceleration [m/s^2].
@@ -109,7 +111,7 @@ class Scenario:
             push [N s].
         push_period: Time between pushes; the first comes after so long, start-up included [s].
         push_duration: How long a push lasts [s].
-        seed: Draws the heights of the steps.
+        seed: Draws the heights of rough ground and of steps.
         timestep: Time step of the simulation and of the control [s].
         mjcf: Path of an MJCF that stands in for the robot's own URDF; empty for the URDF.
     """
@@ -131,6 +133,7 @@ class Scenario:
     ground_time_constant: float = 0.002
     ground_friction: float = 0.8
     slope: float = 0.0
+    ground_roughness: float = 0.0
     step_height: float = 0.0
     step_length: float = 0.3
     gravity: float = 9.81

@@ -5,12 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
 from pronk_pin._typing import Array
-from pronk_pin.compare import Scenario, World, load_scenario
-from pronk_pin.compare.world.ground import steps
+from pronk_pin.compare import (
+    Experiment,
+    Scenario,
+    Schedule,
+    World,
+    build_model,
+    load_scenario,
+    run_cell,
+    steady,
+)
+from pronk_pin.compare.world import ground
+from pronk_pin.compare.world.ground import rough_heights, steps
 from pronk_pin.control import Gains
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot
@@ -99,3 +110,70 @@ def test_steps_are_drawn_by_the_seed_and_reach_up_to_their_height() -> None:
     assert np.any(steps(replace(scenario, seed=1))[1] != heights)
     np.testing.assert_array_equal(steps(scenario)[1], heights)
     assert steps(IDEAL)[0].size == 0
+
+
+ROUGH = replace(IDEAL, ground_roughness=0.002)
+
+
+def test_rough_ground_is_as_high_as_it_says_and_level_at_the_start() -> None:
+    heights = rough_heights(ROUGH)
+    columns = heights.shape[1]
+    middle = slice(columns // 2 - 22, columns // 2 + 23)  # 0.44 m to either side
+    assert np.abs(heights[:, middle]).max() == 0.0
+    away = heights[:, columns // 2 + 100 : columns // 2 + 2100]
+    assert away.std() == pytest.approx(0.002, rel=0.05)
+    assert abs(away.mean()) < 2e-4
+    # Normal, and smooth: neighbours 2 cm apart are nearly as high, those 30 cm apart are not.
+    assert np.mean(np.abs(away) < 0.002) == pytest.approx(0.683, abs=0.03)
+    assert np.corrcoef(away[:, 1:].ravel(), away[:, :-1].ravel())[0, 1] > 0.9
+    assert abs(np.corrcoef(away[:, 15:].ravel(), away[:, :-15].ravel())[0, 1]) < 0.1
+    assert not np.array_equal(heights, rough_heights(replace(ROUGH, seed=1)))
+    np.testing.assert_array_equal(heights, rough_heights(ROUGH))
+
+
+def test_feet_stand_on_rough_ground_where_it_is(robot: Robot) -> None:
+    """A ray from above, and a foot's sphere at rest, find the height that was drawn."""
+    scenario = replace(ROUGH, ground_roughness=0.004)
+    heights = rough_heights(scenario)
+    model = build_model(robot, scenario)
+    data = mujoco.MjData(model)
+    data.qpos[model.joint("z").qposadr[0]] = 2.0
+    mujoco.mj_forward(model, data)
+    groups, geom = np.array([1, 0, 0, 0, 0, 0], dtype=np.uint8), np.zeros(1, dtype=np.int32)
+    rows, columns = heights.shape
+    for row, column in ((125, 5100), (140, 5200), (100, 4600)):
+        place = 0.02 * np.array([column - columns // 2, row - rows // 2])
+        from_above, down = np.array([*place, 1.0]), np.array([0.0, 0.0, -1.0])
+        distance = mujoco.mj_ray(model, data, from_above, down, groups, 1, -1, geom)
+        assert 1.0 - distance == pytest.approx(heights[row, column], abs=1e-6)
+
+
+def test_level_heights_are_the_plane(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robots that stand on a heightfield of equal heights weigh what they weigh on a plane."""
+    monkeypatch.setattr(ground, "rough_heights", lambda _: np.outer([0.0, 1e-9], [0.0, 0.0, 1.0]))
+    worlds = [stiff(robot, scenario, np.zeros(1), 0.4) for scenario in (IDEAL, ROUGH)]
+    standing = [(world.force[0].copy(), world.base[0].copy()) for world in worlds]
+    (force, base), (rough_force, rough_base) = standing
+    assert rough_force[:, 2].sum() == pytest.approx(force[:, 2].sum(), rel=1e-3)
+    np.testing.assert_allclose(rough_base, base, atol=5e-5)  # feet sink in, by less than that
+
+
+def test_seeds_are_other_grounds_and_noises_and_one_seed_is_one_run() -> None:
+    """Over eight seeds the peak errors scatter by some percent; in the nominal scenario by none."""
+    experiment = Experiment(
+        speeds=(0.3,),
+        controllers=("pd",),
+        scenarios=("rough", "nominal"),
+        seeds=tuple(range(8)),
+        schedule=Schedule(startup=0.2, baseline=2.0, learning=0.5),
+    )
+    peaks: dict[str, list[float]] = {"rough": [], "nominal": []}
+    for cell in experiment.cells():
+        strides = steady(run_cell(cell))["peak_error"].isel(joint=2)
+        peaks[cell.scenario].append(float(strides.mean()))
+    spread = {name: np.std(values, ddof=1) / np.mean(values) for name, values in peaks.items()}
+    assert 0.003 < spread["rough"] < 0.1
+    assert spread["nominal"] < 0.1 * spread["rough"]
+    cell = next(cell for cell in experiment.cells() if (cell.scenario, cell.seed) == ("rough", 3))
+    again = steady(run_cell(cell))["peak_error"].isel(joint=2)
+    assert float(again.mean()) == peaks["rough"][3]
