@@ -1,4 +1,4 @@
-"""Commands about learning: `ilc analyze | gains | transfer | seeding`."""
+"""Commands about learning: `ilc analyze | stability | gains | transfer | seeding`."""
 
 from __future__ import annotations
 
@@ -11,13 +11,16 @@ from tyro.conf import Positional, subcommand
 from .._checks import whole
 from ..compare import Results, load_scenario
 from ..compare.studies import (
+    COUPLINGS,
     STRIDES,
     compare_prediction,
     describe_gains,
     describe_prediction,
     describe_seeding,
+    describe_stability,
     describe_transfers,
     measure_seeding,
+    measure_stability,
     measure_transfers,
     simulate_learning,
     stored_learning,
@@ -70,6 +73,34 @@ class Analyze:
             )
             print(describe_prediction(predictions[-1]), end="\n\n")
         print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Say whether learning oscillates, and grows, over the strides: predicted, and measured.
+
+    The laws of stance and flight and the flight's timing correct the same errors; how much of the
+    stance's the law of the flight is shown (coupling) decides whether the three settle.
+    """
+
+    controller: Positional[str] = "ilc"
+    """Controller whose learning is analysed."""
+    speed: tuple[float, ...] = (0.6, 0.8)
+    """Speeds [m/s]."""
+    scenario: str = "payload+delay"
+    """Scenario of the learning."""
+    couplings: tuple[float, ...] = COUPLINGS
+    """Shares of the stance's errors that the flight's law is shown."""
+    robot: str = "a1"
+    """Robot."""
+
+    def run(self) -> None:
+        """Do it."""
+        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        table = measure_stability(
+            spec, self.speed, scenario, couplings=self.couplings, robot=self.robot
+        )
+        print(describe_stability(table))
 
 
 @dataclass(frozen=True)
@@ -164,6 +195,7 @@ class Ilc:
 
     action: (
         Annotated[Analyze, subcommand("analyze")]
+        | Annotated[Stability, subcommand("stability")]
         | Annotated[Gains, subcommand("gains")]
         | Annotated[Transfer, subcommand("transfer")]
         | Annotated[Seeding, subcommand("seeding")]

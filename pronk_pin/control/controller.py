@@ -34,6 +34,7 @@ from .prediction import StrideSettings, lifted_model
 from .signals import (
     PARTS,
     SAMPLES,
+    FlightTiming,
     PhaseLog,
     Reference,
     StrideRecord,
@@ -354,25 +355,33 @@ class Controller:
 
     def _learn(self, rows: IntArray) -> None:
         """Update the feedforward of some robots from their last stride."""
+        if rows.size:
+            self.feedforward[rows] = self._next_feedforward(rows, self.spec.coupling)
+
+    def _next_feedforward(self, rows: IntArray, coupling: float) -> Array:
+        """The feedforward that the laws make of the last stride, shape (m, 2, samples, 12)."""
+        following = self.feedforward[rows]
         for part, law in enumerate(self._laws):
-            if law is not None and rows.size:
+            if law is not None:
                 record = self._last[part].take(rows)
-                learned = learned_by(
-                    law, self._learnable_record(part, rows, record), self.spec.name
-                )
+                shown = self._learnable_record(part, rows, record, coupling)
+                learned = learned_by(law, shown, self.spec.name)
                 if self.guard is not None:
                     step = self.guard.step[rows, None, None]
                     learned = record.feedforward + step * (learned - record.feedforward)
-                self.feedforward[rows, part] = anti_windup(learned, record, self.robot.tau_max)
+                following[:, part] = anti_windup(learned, record, self.robot.tau_max)
+        return following
 
-    def _learnable_record(self, part: int, rows: IntArray, record: StrideRecord) -> StrideRecord:
+    def _learnable_record(
+        self, part: int, rows: IntArray, record: StrideRecord, coupling: float
+    ) -> StrideRecord:
         """Prepare the record that a law learns from: delivered torques, look-ahead, symmetry."""
         learnable = delivered(record)
         if part == 1:
             # What the end of a flight does shows in the stance that follows it, which is yet to
             # come; it will be like the last one.
             ratio = self._flight.duration[rows] / self._stance.duration[rows]
-            learnable = learnable.onward(self._last[0].take(rows), ratio, self.spec.coupling)
+            learnable = learnable.onward(self._last[0].take(rows), ratio, coupling)
             if self.balance is not None:
                 share = self.spec.balance.landing
                 learnable = learnable.changed(lambda values: share * values)
@@ -381,11 +390,35 @@ class Controller:
     def _retime(self, rows: IntArray) -> None:
         """Stretch the references of the next flights of some robots to the measured durations."""
         if self.spec.timing is not None and rows.size:
-            flight = self._flight
-            following = self.spec.timing.next(
-                flight.duration[rows], self._flight_measured[rows], flight.planned[rows]
-            )
-            if self.guard is not None:
-                step = self.guard.step[rows]
-                following = flight.duration[rows] + step * (following - flight.duration[rows])
-            flight.stretch(rows, following)
+            self._flight.stretch(rows, self._next_flight(rows, self.spec.timing))
+
+    def _next_flight(self, rows: IntArray, timing: FlightTiming) -> Array:
+        """Durations of the next flights' references that the timing makes of the last [s], (m,)."""
+        last = self._flight.duration[rows]
+        following = timing.next(last, self._flight_measured[rows], self._flight.planned[rows])
+        if self.guard is not None:
+            following = last + self.guard.step[rows] * (following - last)
+        return following
+
+    @property
+    def memory(self) -> Memory:
+        """What is played in the next stride: feedforward, and how long the flight is to last."""
+        return Memory(self.feedforward.copy(), self.flight)
+
+    @memory.setter
+    def memory(self, memory: Memory) -> None:
+        self.feedforward[:] = memory.feedforward
+        self._flight.stretch(np.arange(len(self.gaits)), memory.flight)
+
+    def learned(self, *, coupling: float | None = None) -> Memory:
+        """What the robots would play if they learned from their last stride, which they do not.
+
+        Args:
+            coupling: By default that of the specification.
+        """
+        rows = np.arange(len(self.gaits))
+        coupling = self.spec.coupling if coupling is None else coupling
+        timing, flight = self.spec.timing, self.flight
+        if timing is not None:
+            flight = self._next_flight(rows, timing)
+        return Memory(self._next_feedforward(rows, coupling), flight)

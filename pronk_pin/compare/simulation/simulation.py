@@ -113,11 +113,16 @@ class Simulation:
         place = np.column_stack([np.zeros(len(joints)), base[:, 1]])
         self.world.reset(place, joints, pitch=base[:, 2])
 
-    def run(self, progress: Progress | None = None) -> StrideLog:
+    def run(
+        self,
+        progress: Progress | None = None,
+        before_stride: Callable[[IntArray], object] | None = None,
+    ) -> StrideLog:
         """Simulate to the end of the schedule.
 
         Args:
             progress: Called with the number of steps done since the last call.
+            before_stride: Called with the robots that are about to begin a stride, each as often.
         """
         schedule = self.schedule
         steps = round((schedule.baseline + schedule.learning) / self._dt)
@@ -132,6 +137,8 @@ class Simulation:
 
         def strides(rows: IntArray) -> None:
             while (going := rows[self._clock[rows] < steps]).size:
+                if before_stride is not None:
+                    before_stride(going)
                 late = self.player.late[going]
                 for ticks in np.unique(late):  # those that are equally late together
                     self._stride(going[late == ticks], steps=steps, late=int(ticks))

@@ -1,8 +1,8 @@
 """Questions that take more than one experiment to answer.
 
 Comes in: a robot, speeds, controllers, or `Results`.
-Goes out: gain reduction, seeding, transfer, prediction, reproduction of Table I, and the loop
-closed with an identified model.
+Goes out: gain reduction, seeding, transfer, stability, prediction, reproduction of Table I, and the
+loop closed with an identified model.
 """
 
 from .gain_reduction import describe_gains, sweep_gains
@@ -17,9 +17,11 @@ from .prediction import (
 )
 from .reproduce import format_reproduction
 from .seeding import describe_seeding, measure_seeding, stayed_up
+from .stability import COUPLINGS, describe_stability, measure_stability
 from .transfer import TOLERANCE, describe_transfers, measure_transfers
 
 __all__ = [
+    "COUPLINGS",
     "STRIDES",
     "TOLERANCE",
     "Prediction",
@@ -28,10 +30,12 @@ __all__ = [
     "describe_gains",
     "describe_prediction",
     "describe_seeding",
+    "describe_stability",
     "describe_transfers",
     "format_loop",
     "format_reproduction",
     "measure_seeding",
+    "measure_stability",
     "measure_transfers",
     "simulate_learning",
     "stayed_up",
