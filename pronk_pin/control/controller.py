@@ -413,12 +413,16 @@ class Controller:
     def learned(self, *, coupling: float | None = None) -> Memory:
         """What the robots would play if they learned from their last stride, which they do not.
 
+        Those of whose last stride nothing can be learned would go on as they are.
+
         Args:
             coupling: By default that of the specification.
         """
-        rows = np.arange(len(self.gaits))
-        coupling = self.spec.coupling if coupling is None else coupling
-        timing, flight = self.spec.timing, self.flight
-        if timing is not None:
-            flight = self._next_flight(rows, timing)
-        return Memory(self._next_feedforward(rows, coupling), flight)
+        rows = np.flatnonzero(self.skipped == 0)
+        feedforward, flight = self.memory
+        if rows.size:
+            coupling = self.spec.coupling if coupling is None else coupling
+            feedforward[rows] = self._next_feedforward(rows, coupling)
+            if self.spec.timing is not None:
+                flight[rows] = self._next_flight(rows, self.spec.timing)
+        return Memory(feedforward, flight)

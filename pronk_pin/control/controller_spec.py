@@ -35,6 +35,7 @@ from .signals import ContactDetector, FlightTiming, Gains, ZeroPhaseFilter
 from .tick_control import (
     BindableTickController,
     ComputedTorque,
+    ExtendedStateObserver,
     TickController,
     WholeBodyQP,
     known_tick_controller,
@@ -172,6 +173,14 @@ _URDF, _IDENTIFIED = ("urdf",), ("urdf", "rotors", "friction", "load")
 _STIFF = Gains(kp=(140.0, 240.0, 360.0), kd=(2.0, 12.0, 4.0))
 """Four times the paper's stiffness and twice its damping."""
 
+_MODEL_ROTORS = ControllerSpec(
+    "model+rotors",
+    source="model",
+    gait_model="datasheet",
+    timing=FlightTiming(),
+    knows=("urdf", "rotors"),
+)
+
 _COMPUTED_TORQUE = ControllerSpec(
     "computed-torque",
     tick_controller=ComputedTorque(),
@@ -209,23 +218,11 @@ CONTROLLERS = {
         ),
         replace(_ILC, name="ilc-imu", imu=True),
         ControllerSpec("model+timing", source="model", timing=FlightTiming(), knows=_URDF),
-        ControllerSpec(
-            "model+rotors",
-            source="model",
-            gait_model="datasheet",
-            timing=FlightTiming(),
-            knows=("urdf", "rotors"),
-        ),
+        _MODEL_ROTORS,
+        replace(_MODEL_ROTORS, name="model+eso", tick_controller=ExtendedStateObserver()),
         replace(_ILC, name="ilc+rotors", gait_model="datasheet", knows=("rotors",)),
         ControllerSpec("pd-stiff", gains=_STIFF),
-        ControllerSpec(
-            "model+rotors-stiff",
-            source="model",
-            gait_model="datasheet",
-            timing=FlightTiming(),
-            gains=_STIFF,
-            knows=("urdf", "rotors"),
-        ),
+        replace(_MODEL_ROTORS, name="model+rotors-stiff", gains=_STIFF),
         replace(_ILC, name="ilc-stiff", gains=_STIFF),
         replace(
             _ILC, name="ilc+rotors-stiff", gait_model="datasheet", gains=_STIFF, knows=("rotors",)

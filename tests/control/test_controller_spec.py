@@ -12,7 +12,7 @@ def test_what_a_controller_knows_goes_with_what_it_is_computed_from() -> None:
     feet's forces too; gaits of the datasheet know the rotors; practice nothing."""
     for spec in CONTROLLERS.values():
         assert set(spec.knows) <= set(KNOWLEDGE)
-        if spec.tick_controller is not None:
+        if isinstance(spec.tick_controller, ComputedTorque):
             assert spec.knows == ("urdf", "rotors", "foot forces")
             continue
         assert ("urdf" in spec.knows) == (spec.source in ("model", "identified"))

@@ -5,6 +5,7 @@ Goes out: motor torques, or `SetPoints` for the motor drivers.
 """
 
 from .computed_torque import ComputedTorque
+from .extended_state_observer import ExtendedStateObserver
 from .tick_controller import (
     BindableTickController,
     ControlTime,
@@ -20,6 +21,7 @@ __all__ = [
     "BindableTickController",
     "ComputedTorque",
     "ControlTime",
+    "ExtendedStateObserver",
     "Observation",
     "SetPoints",
     "TickController",

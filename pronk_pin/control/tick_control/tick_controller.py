@@ -167,6 +167,8 @@ class TickLoop:
         context: The n robots.
 
     Attributes:
+        controller: The tick controller, bound.
+        previous: Torques that the motors were told last, within their limits [N m], shape (n, 12).
         time: How long the controller took.
 
     Raises:
@@ -177,12 +179,12 @@ class TickLoop:
         self, controller: TickController | BindableTickController, context: ControlContext
     ) -> None:
         bind = getattr(controller, "bind", None)
-        self._controller: TickController = controller if bind is None else bind(context)  # type: ignore[assignment]
-        self._name = f"the tick controller {type(self._controller).__name__} of controller "
+        self.controller: TickController = controller if bind is None else bind(context)  # type: ignore[assignment]
+        self._name = f"the tick controller {type(self.controller).__name__} of controller "
         self._name += f"'{context.controller}'"
-        if not callable(getattr(self._controller, "command", None)):
+        if not callable(getattr(self.controller, "command", None)):
             raise InvalidInput(f"{self._name} has no command(observation); add it")
-        steps = float(getattr(self._controller, "period", 0.0)) / context.timestep
+        steps = float(getattr(self.controller, "period", 0.0)) / context.timestep
         if not abs(steps - round(steps)) < 1e-6 or steps < 0.0:
             raise InvalidInput(
                 f"{self._name}: its period must be a whole number of time steps of "
@@ -192,12 +194,12 @@ class TickLoop:
         self._period, self._limit = max(1, round(steps)), context.robot.tau_max
         self._age = np.zeros(n, dtype=np.intp)  # ticks since it was first asked
         self._held = SetPoints(*np.zeros((len(SetPoints._fields), n, NL)))
-        self.previous = np.zeros((n, NL))  # as the motors were told, within their limits
+        self.previous = np.zeros((n, NL))
         self.time = ControlTime()
         self._reset(np.arange(n))
 
     def _reset(self, rows: IntArray) -> None:
-        if callable(reset := getattr(self._controller, "reset", None)):
+        if callable(reset := getattr(self.controller, "reset", None)):
             reset(rows)
 
     def restart(self, rows: IntArray) -> None:
@@ -216,7 +218,7 @@ class TickLoop:
         if due.any():
             asked = observation if due.all() else observation.of(due)
             with self.time.measured():
-                answer = self._controller.command(asked)
+                answer = self.controller.command(asked)
             self._hold(asked, answer)
         self._age[rows] += 1
         self.time.ticks += len(rows)

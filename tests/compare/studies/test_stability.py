@@ -69,7 +69,7 @@ def test_a_controller_without_the_three_is_refused() -> None:
 
 @pytest.mark.slow
 def test_coupling_is_what_makes_payload_and_delay_grow() -> None:
-    """Predicted from responses without learning, and measured by kicks: growth at 1, none at 0.6."""
+    """Predicted from responses without learning, and measured by kicks: growth at 1, not at 0.6."""
     table = measure_stability(
         load_controller("ilc"), [0.8], load_scenario("payload+delay"), couplings=[1.0, 0.6]
     )
