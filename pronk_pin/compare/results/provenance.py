@@ -23,7 +23,16 @@ from ...storage import as_type, read_sealed
 PROVENANCE = "provenance.json"
 """Its name."""
 
-_PACKAGES = ("pronk-pin", "pin", "example-robot-data", "mujoco", "proxsuite", "numpy", "scipy")
+_PACKAGES = (
+    "pronk-pin",
+    "pin",
+    "example-robot-data",
+    "mujoco",
+    "proxsuite",
+    "daqp",
+    "numpy",
+    "scipy",
+)
 _TIMEOUT = 10.0  # [s], for git
 
 

@@ -8,16 +8,17 @@
 
 Its tasks are weighted by the mass matrix, as a body itself weights them (Gauss's principle of least
 constraint). Where neither cones nor limits bind, its torques are those of computed torque: then the
-closed form is the answer, and only the others are solved, by ProxQP. Where there is no solution (no
-torques keep the feet down), computed torque's are played, within the limits.
+closed form is the answer, and only the others are solved, by DAQP, a dual active-set method, which
+gives the same to the bit each time. Where there is no solution (no torques keep the feet down),
+computed torque's are played, within the limits.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import daqp
 import numpy as np
-from proxsuite import proxqp
 
 from ..._checks import Interval, keep_reals
 from ..._typing import Array, BoolArray
@@ -33,8 +34,9 @@ _FORCE_WEIGHT = 1e-6
 """Cost of forces against torques [m^2], as in `inverse_dynamics`."""
 _ACCURACY = 1e-6
 """Violation of cones and limits that passes [N, N m]."""
-_ITERATIONS, _INNER = 100, 50
-"""Solvable problems take some ten; ProxQP's own 1500 inner ones would spend seconds on others."""
+_UNBOUNDED = 1e30
+_INEQUALITY, _EQUALITY, _SOLVED = 0, 5, 1
+"""DAQP's words."""
 
 
 @dataclass(frozen=True)
@@ -157,19 +159,18 @@ def solve(terms: Terms, k: int, friction: float, limit: Array) -> Array | None:
     gradient = _TORQUE_WEIGHT * torque.T @ rest[TRUNK:]
     gradient[:size] -= mass @ wanted
     sides = cone_sides(friction, forces // 3)
-    qp = proxqp.dense.QP(size + forces, TRUNK + forces, len(sides) + len(torque))
-    qp.settings.eps_abs, qp.settings.eps_rel = _ACCURACY, 0.0
-    qp.settings.max_iter, qp.settings.max_iter_in = _ITERATIONS, _INNER
-    qp.init(
-        H=hessian,
-        g=gradient,
-        A=np.vstack([balance[:TRUNK], np.hstack([jacobian, np.zeros((forces, forces))])]),
-        b=np.concatenate([-rest[:TRUNK], -bias]),
-        C=np.vstack([np.hstack([np.zeros((len(sides), size)), sides]), torque]),
-        l=np.concatenate([np.full(len(sides), -np.inf), -limit - rest[TRUNK:]]),
-        u=np.concatenate([np.zeros(len(sides)), limit - rest[TRUNK:]]),
+    constraints = np.vstack(
+        [
+            balance[:TRUNK],
+            np.hstack([jacobian, np.zeros((forces, forces))]),
+            np.hstack([np.zeros((len(sides), size)), sides]),
+            torque,
+        ]
     )
-    qp.solve()
-    if qp.results.info.status != proxqp.QPSolverOutput.PROXQP_SOLVED:
-        return None
-    return np.asarray(torque @ qp.results.x + rest[TRUNK:])
+    equal = np.concatenate([-rest[:TRUNK], -bias])
+    upper = np.concatenate([equal, np.zeros(len(sides)), limit - rest[TRUNK:]])
+    lower = np.concatenate([equal, np.full(len(sides), -_UNBOUNDED), -limit - rest[TRUNK:]])
+    sense = np.full(len(upper), _INEQUALITY, dtype=np.int32)
+    sense[: len(equal)] = _EQUALITY
+    solution, _, status, _ = daqp.solve(hessian, gradient, constraints, upper, lower, sense)
+    return np.asarray(torque @ solution + rest[TRUNK:]) if status == _SOLVED else None

@@ -7,12 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from pronk_pin import load_robot
 from pronk_pin._typing import Array
+from pronk_pin.compare import Schedule, Simulation, load_scenario
+from pronk_pin.control import load_controller
 from pronk_pin.control.tick_control.computed_torque import State
 from pronk_pin.control.tick_control.level_robot import TRUNK, LevelRobot, cheapest_forces
 from pronk_pin.control.tick_control.whole_body_qp import Terms, WholeBodyQP, solve
 from pronk_pin.errors import InvalidInput
-from pronk_pin.gait import Gait
+from pronk_pin.gait import Gait, load_library
 from pronk_pin.robot import Robot, with_rotors
 
 WIDE = 1e6
@@ -89,3 +92,23 @@ def test_without_a_solution_it_says_so(case: Case) -> None:
 def test_friction_is_positive() -> None:
     with pytest.raises(InvalidInput, match="whole-body QP: friction"):
         WholeBodyQP(friction=0.0)
+
+
+def test_the_same_run_is_the_same_to_the_bit() -> None:
+    """Whatever lies in memory beside it: the torques of three runs with noise."""
+    torques, keep = [], []
+    for size in (10, 3331, 777):
+        keep.append([bytearray(size + k) for k in range(200)])
+        simulation = Simulation(
+            load_robot("a1"),
+            [load_library("a1").at(0.3)],
+            load_controller("whole-body-qp"),
+            load_scenario("noise"),
+            schedule=Schedule(startup=0.1, baseline=0.8, learning=0.0),
+            rng=np.random.default_rng(0),
+        )
+        torques.append(simulation.run()["feedback"].tobytes())
+        loop = simulation.controller.tick_loop
+        assert loop is not None
+        assert loop.controller.solved[0] > 10  # type: ignore[attr-defined]
+    assert torques[0] == torques[1] == torques[2]
