@@ -24,14 +24,8 @@ PROVENANCE = "provenance.json"
 """Its name."""
 
 _PACKAGES = (
-    "pronk-pin",
-    "pin",
-    "example-robot-data",
-    "mujoco",
-    "proxsuite",
-    "daqp",
-    "numpy",
-    "scipy",
+    *("pronk-pin", "pin", "example-robot-data", "mujoco", "proxsuite"),
+    *("daqp", "numpy", "scipy"),
 )
 _TIMEOUT = 10.0  # [s], for git
 

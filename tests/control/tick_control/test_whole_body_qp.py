@@ -104,7 +104,7 @@ def test_the_same_run_is_the_same_to_the_bit() -> None:
             [load_library("a1").at(0.3)],
             load_controller("whole-body-qp"),
             load_scenario("noise"),
-            schedule=Schedule(startup=0.1, baseline=0.8, learning=0.0),
+            schedule=Schedule(startup=0.1, baseline=1.0, learning=0.0),
             rng=np.random.default_rng(0),
         )
         torques.append(simulation.run()["feedback"].tobytes())
