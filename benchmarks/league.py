@@ -19,14 +19,15 @@ import numpy as np
 import pandas as pd
 
 from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
-from pronk_pin.control import ControllerSpec, load_controller
+from pronk_pin.control import ComputedTorque, ControllerSpec, load_controller
 
 SPEEDS = (-0.4, 0.0, 0.4, 0.8)
 MULTIPLES = (1.0, 2.0, 4.0, 8.0)
 FREQUENCIES = (60.0, 100.0, 140.0)
 """Natural frequencies of computed torque [1/s]."""
 PLAYED = (
-    *("pd", "model", "model+timing", "model+rotors", "identified", "identified+gait"),
+    *("pd", "model", "model+timing", "model+rotors", "model+eso"),
+    *("identified", "identified+gait"),
     *("ilc-paper", "ilc-stance", "ilc", "ilc+rotors", "library"),
 )
 TICKS = ("computed-torque+rotors", "whole-body-qp+rotors")
@@ -40,14 +41,14 @@ def variants(name: str) -> dict[str, ControllerSpec]:
     """A controller with all gains, by what they are called; the first has the usual ones."""
     spec = load_controller(name)
     law = spec.tick_controller
-    if law is not None:
-        usual = law.omega  # type: ignore[attr-defined]
+    if isinstance(law, ComputedTorque):
+        usual = law.omega
         values = (usual, *(value for value in FREQUENCIES if value != usual))
         return {
             f"omega {value:g}": replace(
                 spec,
                 name=name if value == usual else f"{name}_{value:g}",
-                tick_controller=replace(law, omega=value),  # type: ignore[type-var]
+                tick_controller=replace(law, omega=value),
             )
             for value in values
         }
