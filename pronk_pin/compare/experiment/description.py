@@ -32,6 +32,8 @@ Description: TypeAlias = dict[str, Any]
 
 T = TypeVar("T")
 
+_SCRIPT = "__main__"
+
 _ROOMS = (control, feedback, learning, signals, tick_control, world, robot)
 """Where our own classes are looked up, by their names."""
 
@@ -62,6 +64,8 @@ def describe(value: object) -> Any:
 def _origin(thing: Any) -> Description:
     """Where a class or function comes from; of one from outside, the SHA-256 of its module too."""
     module, name = str(thing.__module__), str(thing.__qualname__)
+    if module == "__mp_main__":  # the script itself, in a worker
+        module = _SCRIPT
     if module.partition(".")[0] == _OURS:
         return {"class": name}
     try:
@@ -105,6 +109,11 @@ class Unloaded:
                 is no dataclass: such an object has to be given again.
         """
         address = self.description["class"]
+        if address.startswith(f"{_SCRIPT}:"):
+            raise InvalidInput(
+                f"{address} is a class of the script that made this result; run that script again, "
+                "or move the class into a module that can be imported"
+            )
         found = imported(address)
         if not _is_dataclass(found):
             raise InvalidInput(

@@ -129,6 +129,9 @@ def test_a_stored_law_that_has_changed_or_cannot_be_made_is_refused(laboratory: 
     changed = replace(law, description={**law.description, "source_sha256": "0" * 64})
     with pytest.raises(InvalidInput, match="has changed since; put the old one back"):
         changed.load()
+    of_a_script = replace(law, description={**law.description, "class": "__main__:MyLaw"})
+    with pytest.raises(InvalidInput, match="a class of the script that made this result; run"):
+        of_a_script.load()
     untold = own(laboratory, controllers=("pd", f"{laboratory}:untold"))
     document = describe(untold.controller("untold"))
     with pytest.raises(InvalidInput, match=r"no dataclass.*pass the experiment with the object"):

@@ -1,0 +1,26 @@
+"""A result as tables and arrays: `python examples/results_in_pandas.py [folder]`.
+
+`summary()` is one long table, a row a number; `strides()` the labelled strides of one simulation.
+"""
+
+import sys
+
+from pronk_pin.compare import Experiment, Schedule, run_experiment
+
+if __name__ == "__main__":
+    experiment = Experiment(
+        speeds=(-0.3, 0.0, 0.3),
+        controllers=("pd", "ilc"),
+        schedule=Schedule(baseline=2.0, learning=5.0),
+    )
+    results = run_experiment(experiment, *(sys.argv[1:] or ["results/pandas"]), workers=2)
+    summary = results.summary()
+    calf = summary.query("metric == 'peak_error' and joint == 'calf'")
+    print(calf.pivot(index="speed", columns="controller", values="value").round(4))
+
+    strides = results.strides(results.find(controller="ilc"))
+    peaks = strides["peak_error"].groupby("kind").mean()  # over the legs
+    history = peaks.sel(kind="calf").to_pandas()
+    print(history.iloc[:, ::3].round(3).to_string())
+    learned = strides["feedforward"].isel(stride=-1).sel(part="stance")
+    print(f"largest learned torque {float(abs(learned).max()):.1f} N m")

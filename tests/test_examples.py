@@ -1,0 +1,45 @@
+"""The examples, as files outside the package: each runs, and its folder can be reported on."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pronk_pin import cli
+
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_where_it_was_copied_to(
+    example: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With two workers; then its result is reported by a process that has not got its classes."""
+    script, folder = tmp_path / example.name, tmp_path / "result"
+    shutil.copy(example, script)
+    done = subprocess.run(
+        [sys.executable, script, folder],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "controller" in done.stdout
+    assert len(script.read_text().splitlines()) < 90
+    assert cli.main(["report", str(folder)]) == 0
+    assert "report.html" in capsys.readouterr().out
+    assert (folder / "replay.html").is_file()
+
+
+def test_every_example_is_named_in_the_documentation() -> None:
+    page = (EXAMPLES[0].parents[1] / "docs" / "laboratory.md").read_text()
+    assert len(EXAMPLES) >= 6
+    assert not [path.name for path in EXAMPLES if path.name not in page]
