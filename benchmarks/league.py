@@ -23,14 +23,14 @@ from pronk_pin.control import ComputedTorque, ControllerSpec, load_controller
 
 SPEEDS = (-0.4, 0.0, 0.4, 0.8)
 MULTIPLES = (1.0, 2.0, 4.0, 8.0)
-FREQUENCIES = (60.0, 100.0, 140.0)
-"""Natural frequencies of computed torque [1/s]."""
 PLAYED = (
-    *("pd", "model", "model+timing", "model+rotors", "model+eso"),
-    *("identified", "identified+gait"),
+    *("pd", "model", "model+timing", "model+rotors", "identified", "identified+gait"),
     *("ilc-paper", "ilc-stance", "ilc", "ilc+rotors", "library"),
 )
-TICKS = ("computed-torque+rotors", "whole-body-qp+rotors")
+TICKS = {"computed-torque+rotors": (100.0, 60.0, 140.0), "whole-body-qp+rotors": (100.0, 60.0)}
+"""Those that are asked at every tick, with their natural frequencies [1/s], the usual one first."""
+USUAL_ONLY = ("model+eso",)
+"""Whose gains are not changed."""
 NO_DELAY = ("nominal", "payload", "weak-motors", "ideal")
 DELAY = ("delay", "payload+delay")
 SCENARIOS = (*NO_DELAY, *DELAY)
@@ -42,17 +42,15 @@ def variants(name: str) -> dict[str, ControllerSpec]:
     spec = load_controller(name)
     law = spec.tick_controller
     if isinstance(law, ComputedTorque):
-        usual = law.omega
-        values = (usual, *(value for value in FREQUENCIES if value != usual))
         return {
             f"omega {value:g}": replace(
                 spec,
-                name=name if value == usual else f"{name}_{value:g}",
+                name=name if value == law.omega else f"{name}_{value:g}",
                 tick_controller=replace(law, omega=value),
             )
-            for value in values
+            for value in TICKS[name]
         }
-    if spec.source in ("library", "identified") and not spec.timing:
+    if name in USUAL_ONLY or (spec.source == "identified" and not spec.timing):
         return {"x1": spec}
     return {
         f"x{m:g}": replace(
@@ -123,7 +121,7 @@ class League:
 
 def main() -> None:
     """Run, and print the tables."""
-    controllers = {name: variants(name) for name in (*PLAYED, *TICKS)}
+    controllers = {name: variants(name) for name in (*PLAYED, *USUAL_ONLY, *TICKS)}
     experiment = Experiment(
         speeds=SPEEDS,
         controllers=tuple(spec for specs in controllers.values() for spec in specs.values()),
