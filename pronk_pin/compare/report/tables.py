@@ -25,6 +25,9 @@ SHOWN_PARAMETERS = {
     "ground_time_constant": ("contact [ms]", 1e3, ".1f"),
     "ground_friction": ("ground friction", 1.0, ".2f"),
     "slope": ("slope [rad]", 1.0, "+.3f"),
+    "delay": ("motors late [ms]", 1e3, ".0f"),
+    "touchdown_latency": ("contact sensor late [ms]", 1e3, ".0f"),
+    "touchdown_jitter": ("its jitter [ms]", 1e3, ".0f"),
 }
 """What is drawn of a sampled scenario and matters to every base: column, factor of it, format."""
 
