@@ -15,7 +15,16 @@ from pronk_pin import cli
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+SLOW = ("whole_body_qp",)
+
+
+@pytest.mark.parametrize(
+    "example",
+    [
+        pytest.param(path, marks=[pytest.mark.slow] * (path.stem in SLOW), id=path.stem)
+        for path in EXAMPLES
+    ],
+)
 def test_an_example_runs_where_it_was_copied_to(
     example: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
