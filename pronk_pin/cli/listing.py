@@ -11,12 +11,13 @@ from tyro.conf import Positional
 from .._registry import announced_names
 from ..compare import KNOWN
 from ..compare.experiment import SUITES, load_suite
+from ..compare.metrics import METRICS
 from ..compare.world import BASE_SCENARIOS
 from ..control import CONTROLLERS, ControllerSpec, load_controller
 from ..gait import shipped_libraries
 from ..robot import ROBOTS, load_robot_spec
 
-Kind: TypeAlias = Literal["controllers", "robots", "gaits", "scenarios", "suites"]
+Kind: TypeAlias = Literal["controllers", "robots", "gaits", "scenarios", "metrics", "suites"]
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,13 @@ def _scenarios() -> Iterator[tuple[str, str]]:
         yield name, "announced by an installed package"
 
 
+def _metrics() -> Iterator[tuple[str, str]]:
+    for name, (unit, text) in METRICS.items():
+        yield f"{name} [{unit}]", text
+    for name in announced_names("metric"):
+        yield name, "announced by an installed package"
+
+
 def _suites() -> Iterator[tuple[str, str]]:
     for name in SUITES:
         suite = load_suite(name)
@@ -93,5 +101,6 @@ _LISTS: dict[Kind, Callable[[], Iterator[tuple[str, str]]]] = {
     "robots": _robots,
     "gaits": _gaits,
     "scenarios": _scenarios,
+    "metrics": _metrics,
     "suites": _suites,
 }

@@ -7,7 +7,7 @@ Goes out: `Results`: a folder of strides, a summary, tables, and what was learne
 from .execution import run_experiment
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
 from .identification import Explanation, describe, explain
-from .metrics import reduction, steady, summarize
+from .metrics import Metric, reduction, steady, summarize
 from .results import Results, default_folder
 from .simulation import Schedule, Simulation
 from .world import (
@@ -36,6 +36,7 @@ __all__ = [
     "Experiment",
     "Explanation",
     "ForeignRobot",
+    "Metric",
     "Mismatch",
     "Results",
     "Scenario",

@@ -142,7 +142,9 @@ def _summarize(results: Results, made: Mapping[Cell, CellSummary]) -> None:
     """Write the summary; the strides of cells that this run has not made are read for it."""
     results.write_summary(
         join_summaries(
-            made[cell] if cell in made else summarize_cell(results.strides(cell))
+            made[cell]
+            if cell in made
+            else summarize_cell(results.strides(cell), cell.experiment.own_metrics)
             for cell in results.experiment.cells()
         )
     )
@@ -309,7 +311,7 @@ def _make(cell: Cell, dependency: xr.Dataset | None, progress: Progress) -> Fini
         times.append(time.perf_counter())
         data = encode(strides)
         times.append(time.perf_counter())
-        summary = summarize_cell(strides)
+        summary = summarize_cell(strides, cell.experiment.own_metrics)
         times.append(time.perf_counter())
     simulation, encoding, summarizing = (after - before for before, after in pairwise(times))
     return FinishedCell(data, summary, simulation, control_time.per_tick, encoding, summarizing)

@@ -25,7 +25,7 @@ from ...control import StrideRecord, feedback, learning, signals, tick_control
 from ...control.signals import ControlContext
 from ...errors import InvalidInput
 from ...storage import sha256
-from .. import world
+from .. import metrics, world
 
 Description: TypeAlias = dict[str, Any]
 """Nested dictionaries, lists, strings and numbers."""
@@ -34,7 +34,7 @@ T = TypeVar("T")
 
 _SCRIPT = "__main__"
 
-_ROOMS = (control, feedback, learning, signals, tick_control, world, robot)
+_ROOMS = (control, feedback, learning, signals, tick_control, world, robot, metrics)
 """Where our own classes are looked up, by their names."""
 
 
@@ -79,7 +79,7 @@ def _origin(thing: Any) -> Description:
 class Unloaded:
     """An object of a class from outside, as its description has it: it loads when it is bound.
 
-    It passes for a learning law and for a tick controller.
+    It passes for a learning law, a tick controller and a function.
 
     Attributes:
         description: Its class, by address, the SHA-256 of its module, and its fields.
@@ -96,6 +96,10 @@ class Unloaded:
         found = self.load()
         bind = getattr(found, "bind", None)
         return found if bind is None else bind(context)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function that it stands for."""
+        return self.load()(*arguments)  # type: ignore[operator]
 
     def update(self, record: StrideRecord) -> Array:
         """Nothing: a law is bound before it is used."""
@@ -115,7 +119,8 @@ class Unloaded:
                 "or move the class into a module that can be imported"
             )
         found = imported(address)
-        if not _is_dataclass(found):
+        function = inspect.isroutine(found)
+        if not function and not _is_dataclass(found):
             raise InvalidInput(
                 f"{address} is no dataclass, so it cannot be made again of what is on record; pass "
                 "the experiment with the object itself to run_experiment"
@@ -126,7 +131,7 @@ class Unloaded:
                 f"the module of {address} has changed since; put the old one back, or take another "
                 "folder"
             )
-        return _made(found, self.description, address)
+        return found if function else _made(found, self.description, address)
 
 
 def restore(document: object, kind: type[T], what: str) -> T:

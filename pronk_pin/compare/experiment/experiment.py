@@ -29,6 +29,7 @@ from ...robot import (
     load_robot_spec,
     with_rotors,
 )
+from ..metrics import Metric, load_metric
 from ..simulation import Schedule
 from ..world import Scenario, load_scenario, shipped_scenario
 from .description import describe
@@ -69,6 +70,7 @@ def _by_names(metavar: str) -> PrimitiveConstructorSpec[Any]:
 Controllers: TypeAlias = Annotated[
     tuple[str | ControllerSpec, ...], _by_names("[NAME|MODULE:OBJECT [...]]")
 ]
+Metrics: TypeAlias = Annotated[tuple[str | Metric, ...], _by_names("[MODULE:OBJECT [...]]")]
 Scenarios: TypeAlias = Annotated[
     tuple[str | Scenario, ...], _by_names("[NAME|MODULE:OBJECT [...]]")
 ]
@@ -100,6 +102,7 @@ class Experiment:
             it
             as it is. The file is read when the experiment is run, and not before.
         schedule: What happens when.
+        metrics: Metrics of one's own, beside ours: `Metric` objects, or their addresses.
         batches: Speeds that are simulated together, in the order in which they were added to a
             results folder; empty for all at once.
     """
@@ -114,6 +117,7 @@ class Experiment:
     base: str = "locked"
     mjcf: str = ""
     schedule: Schedule = field(default_factory=Schedule)
+    metrics: Metrics = ()
     batches: Annotated[tuple[tuple[float, ...], ...], Suppress] = ()
 
     def __post_init__(self) -> None:
@@ -126,6 +130,9 @@ class Experiment:
         shortest = tuple(_shortest("controller", spec, CONTROLLERS.get) for spec in specs)
         keep(self, "controllers", shortest)
         keep(self, "scenarios", tuple(_shortest("scenario", w, shipped_scenario) for w in worlds))
+        keep(self, "metrics", tuple(load_metric(value) for value in self.metrics))
+        if len({metric.name for metric in self.own_metrics}) < len(self.metrics):
+            raise InvalidInput("metrics must name none of them twice")
         named: dict[str, tuple[object, ...]] = {
             "speeds": self.speeds,
             "controllers": self.controller_names,
@@ -154,6 +161,7 @@ class Experiment:
             ("speeds", real, 1000),
             ("controllers", lambda _, value: value, 1000),
             ("scenarios", lambda _, value: value, 1000),
+            ("metrics", lambda _, value: value, 1000),
             ("seeds", seed, 10_000),
         ):
             values: tuple[object, ...] = sequence_of(name, getattr(self, name), check, wanted=name)
@@ -219,6 +227,11 @@ class Experiment:
         """Names of the scenarios."""
         return tuple(map(_name, self.scenarios))
 
+    @property
+    def own_metrics(self) -> tuple[Metric, ...]:
+        """The metrics of one's own."""
+        return tuple(map(load_metric, self.metrics))
+
     def controller(self, name: str) -> ControllerSpec:
         """The controller of a name: one of the experiment's, or a shipped one."""
         return load_controller(_find(self.controllers, name))
@@ -279,7 +292,7 @@ class Experiment:
             for name, mine, theirs in _fixed(self, other)
             if mine != theirs
         ]
-        for kind in ("controllers", "scenarios"):
+        for kind in ("controllers", "scenarios", "metrics"):
             there, here = (
                 {_name(value): describe(value) for value in getattr(each, kind)}
                 for each in (self, other)
@@ -292,7 +305,11 @@ class Experiment:
             name: tuple(dict.fromkeys((*getattr(self, name), *getattr(other, name))))
             for name in ("seeds", "speeds")
         }
-        for kind in ("controllers", "scenarios"):  # live objects in place of those on record
+        for kind in (
+            "controllers",
+            "scenarios",
+            "metrics",
+        ):  # live objects in place of those on record
             both = {_name(v): v for v in (*getattr(self, kind), *getattr(other, kind))}
             more[kind] = tuple(both.values())
         added = tuple(speed for speed in other.speeds if speed not in self.speeds)

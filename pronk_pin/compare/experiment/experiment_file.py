@@ -17,6 +17,7 @@ from ...control import ControllerSpec
 from ...errors import FileProblem, PronkError
 from ...robot import RobotSpec
 from ...storage import as_type, damaged, read_yaml
+from ..metrics import Metric
 from ..simulation import Schedule
 from ..world import Scenario
 from .description import describe, restore
@@ -40,6 +41,7 @@ class _Document:
     base: str | None = None
     mjcf: str | None = None
     schedule: Schedule | None = None
+    metrics: tuple[str | dict[str, Any], ...] | None = None
     batches: tuple[tuple[float, ...], ...] | None = None
 
 
@@ -53,6 +55,7 @@ def to_document(experiment: Experiment) -> dict[str, Any]:
         "gaits": GAITS if own else experiment.gaits,
         "controllers": describe(experiment.controllers),
         "scenarios": describe(experiment.scenarios),
+        "metrics": describe(experiment.metrics),
         "schedule": dataclasses.asdict(experiment.schedule),
     }
 
@@ -72,7 +75,8 @@ def from_document(document: object, path: Path, remedy: str) -> Experiment:
     known = as_type(document, _Document, path, remedy, what="experiment")
     parts = {part.name: getattr(known, part.name) for part in dataclasses.fields(known)}
     fields: dict[str, Any] = {name: part for name, part in parts.items() if part is not None}
-    for name, kind in (("controllers", ControllerSpec), ("scenarios", Scenario)):
+    kinds = {"controllers": ControllerSpec, "scenarios": Scenario, "metrics": Metric}
+    for name, kind in kinds.items():
         if name in fields:
             fields[name] = tuple(
                 value if isinstance(value, str) else restore(value, kind, f"{name}[{k}]")

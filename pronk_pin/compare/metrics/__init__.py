@@ -25,6 +25,7 @@ from .metrics import (
     summarize,
     summarize_cell,
 )
+from .own_metrics import METRICS, Metric, load_metric
 from .paper_table import table_1
 from .statistics import (
     CONFIDENCE,
@@ -52,12 +53,14 @@ __all__ = [
     "KEYS",
     "LEARNER",
     "LEAST_UNITS",
+    "METRICS",
     "NO_INTERVAL",
     "RIVAL",
     "STEADY_STRIDES",
     "VARIABLES",
     "CellSummary",
     "Interval",
+    "Metric",
     "PeakHistory",
     "beat_rows",
     "beaten",
@@ -70,6 +73,7 @@ __all__ = [
     "in_family",
     "join_summaries",
     "lessons",
+    "load_metric",
     "mean_interval",
     "peak_history",
     "reduction",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..._typing import Array, BoolArray, IntArray
 from ...control import SKIPPED
 from ...robot import JOINTS
 from .effort import effort
+from .own_metrics import Metric
 from .time_to_beat import JUDGED, PeakHistory, beat_rows
 
 STEADY_STRIDES = 30
@@ -90,7 +91,7 @@ def by_joint(values: xr.DataArray) -> xr.DataArray:
     return joined.assign_coords(joint=list(JOINTS)).transpose(*values.dims)
 
 
-def summarize(strides: xr.Dataset) -> pd.DataFrame:
+def summarize(strides: xr.Dataset, own_metrics: Sequence[Metric] = ()) -> pd.DataFrame:
     """Compute the summary of one simulation.
 
     Over the N steady strides k, with the error e(s) = q_d - q of a joint in stance:
@@ -119,6 +120,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
 
     Args:
         strides: What `Simulation` recorded; the same from memory and from its file.
+        own_metrics: Others than these.
     """
     if strides.sizes["stride"] == 0:
         strides = strides.reindex(stride=[0])  # of nobody
@@ -139,7 +141,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
     torques = {str(name): _array(stance[name], "phase", "joint") for name in stance}
     skipped = _array(strides["skipped"]) if "skipped" in strides else None
     spent, switched = effort(strides), _switched(strides)
-    rows = []
+    rows, others = [], [row for metric in own_metrics for row in metric.rows(strides)]
     for k, speed in enumerate(strides["speed"].to_numpy()):
         count = int(strides["count"][k])
         learning = scalars["learning"][k, :count] == 1
@@ -159,6 +161,7 @@ def summarize(strides: xr.Dataset) -> pd.DataFrame:
             *_settling(per_joint["peak_error"][k, :count], learning),
             *_growth(per_joint["peak_error"][k, :count][learning]),
             *(_lessons(skipped[k, :count][learning]) if skipped is not None else ()),
+            *(row for robot, row in others if robot == k),
         ]
         rows += [
             {**settings, "speed": float(speed), **dict(zip(COLUMNS[-4:], row, strict=True))}
@@ -296,9 +299,9 @@ class CellSummary(NamedTuple):
     """What its rows relative to another simulation are made of."""
 
 
-def summarize_cell(strides: xr.Dataset) -> CellSummary:
+def summarize_cell(strides: xr.Dataset, own_metrics: Sequence[Metric] = ()) -> CellSummary:
     """Compute what one simulation gives to the summary of its experiment."""
-    return CellSummary(summarize(strides), peak_history(strides))
+    return CellSummary(summarize(strides, own_metrics), peak_history(strides))
 
 
 def join_summaries(cells: Iterable[CellSummary]) -> pd.DataFrame:

@@ -13,6 +13,7 @@ from ..experiment import differences, to_document
 from ..metrics import LEAST_UNITS, Interval, compare_pairs, family, robots
 from ..results import Results
 from .cells import between, number
+from .overview import own_metrics
 from .tables import SHOWN
 
 LEVEL = 0.05
@@ -33,9 +34,9 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
     whatever the errors do.
 
     Returns:
-        A row each scenario, controller and joint: `before`, `after` [rad], `difference` and its
-        interval from `low` to `high`, `p` (adjusted), `robots` compared, `fallen_before`,
-        `fallen_after`, and `change`: "better", "worse" or "".
+        A row each scenario, controller and joint, or metric of one's own: `before`, `after` [rad],
+        `difference` and its interval from `low` to `high`, `p` (adjusted), `robots` compared,
+        `fallen_before`, `fallen_after`, and `change`: "better", "worse" or "".
 
     Raises:
         InvalidInput: Nothing is in both.
@@ -45,10 +46,12 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
         for world, controller in _cells(before)
         if (world, controller) in set(_cells(after))
     ]
+    own = dict.fromkeys(name for name, _ in own_metrics(before) if name in set(after["metric"]))
+    compared = [*(("peak_error", joint) for joint in SHOWN), *((name, "-") for name in own)]
     rows = [
-        _row(before, after, world, controller, joint)
+        _row(before, after, world, controller, metric, joint)
         for world, controller in keys
-        for joint in SHOWN
+        for metric, joint in compared
     ]
     if not rows:
         raise InvalidInput(
@@ -84,7 +87,7 @@ def format_changes(first: Results, second: Results) -> str:
     few = ~named & ~silent & ~identical & (table["robots"] < LEAST_UNITS)
     same = ~named & ~silent & ~identical & ~few
     lines.append(
-        f"{named.sum()} of {len(table)} mean peak errors changed beyond noise (at most {LEVEL:.0%} "
+        f"{named.sum()} of {len(table)} means changed beyond noise (at most {LEVEL:.0%} "
         f"of those named are false alarms)."
         + (f" Of {same.sum()} no change is shown." if same.any() else "")
         + (f" {identical.sum()} are the same to the bit." if identical.any() else "")
@@ -116,10 +119,17 @@ def _cells(summary: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def _row(
-    before: pd.DataFrame, after: pd.DataFrame, world: str, controller: str, joint: str
+    before: pd.DataFrame,
+    after: pd.DataFrame,
+    world: str,
+    controller: str,
+    metric: str,
+    joint: str,
 ) -> dict[str, Any]:
     mine: dict[str, Any] = {"scenario": world, "controller": controller}
-    one, other = (robots(summary, **mine, joint=joint) for summary in (after, before))
+    one, other = (
+        robots(summary, **mine, metric=metric, joint=joint) for summary in (after, before)
+    )
     fallen = [int(part.isna().to_numpy().sum()) for part in (one, other)]
     if not one.index.equals(other.index):  # other seeds or sampled scenarios: speed by speed
         one, other = one.mean().to_frame().T, other.mean().to_frame().T
@@ -129,7 +139,7 @@ def _row(
     pairs = pairs[np.isfinite(pairs)]
     return {
         **mine,
-        "joint": joint,
+        "joint": metric if joint == "-" else joint,
         "before": float(np.nanmean(other.to_numpy())) if pairs.size else np.nan,
         "after": float(np.nanmean(one.to_numpy())) if pairs.size else np.nan,
         "difference": found.difference.value,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..._typing import Array
 from ..metrics import (
+    METRICS,
     NO_INTERVAL,
     RIVAL,
     Interval,
@@ -86,6 +87,7 @@ class ControllerOverview:
         diverging: Robots whose errors grew again while they learned, see `compare.metrics`.
         robots: How many there were, with those that finished no stride, of which neither is known.
         unit: What the intervals are drawn over, see `compare.metrics.statistics`.
+        own: Mean and unit of a user's own metrics, over the robots that did not fall.
     """
 
     joints: Mapping[str, JointOverview]
@@ -103,6 +105,7 @@ class ControllerOverview:
     diverging: int
     robots: int
     unit: str
+    own: Mapping[str, tuple[float, str]] = field(default_factory=dict)
 
 
 Overview: TypeAlias = dict[str, ControllerOverview]
@@ -165,7 +168,14 @@ def _reached(
         diverging=int(np.nansum(values("diverging"))),
         robots=len(upright),
         unit=unit_of(table("upright")),
+        own={name: (_mean(values(name)), unit) for name, unit in own_metrics(own)},
     )
+
+
+def own_metrics(summary: pd.DataFrame) -> list[tuple[str, str]]:
+    """Names and units of a user's own metrics in a summary."""
+    found = summary[~summary["metric"].isin(list(METRICS))]
+    return list(dict.fromkeys(zip(found["metric"], found["unit"], strict=True)))
 
 
 def _joint(

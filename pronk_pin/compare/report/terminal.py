@@ -101,6 +101,14 @@ def format_overview(table: Overview) -> str:
             f"{row.upright} of {row.robots}"
             + (f", {row.diverging} diverging" if row.diverging else "")
         )
+    own = {metric: unit for row in table.values() for metric, (_, unit) in row.own.items()}
+    for metric, unit in own.items():
+        means = [
+            f"{name} {number(row.own[metric][0], '.4g')}"
+            for name, row in table.items()
+            if metric in row.own
+        ]
+        lines.append(f"{'':>{wide}}  {metric} [{unit}]: {', '.join(means)}")
     if units := units_of_intervals(table):
         lines.append(f"{'':>{wide}}  intervals over the {units}")
     lines.append(

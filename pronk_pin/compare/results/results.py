@@ -33,8 +33,8 @@ import xarray as xr
 from ..._checks import instance_of
 from ..._checks import path as known_path
 from ...errors import FileProblem, InvalidInput
-from ...storage import read_bytes, reading, sealed, write_file
-from ..experiment import Cell, Definition, Experiment, cell_definition, define
+from ...storage import read_bytes, reading, sealed, sha256, write_file
+from ..experiment import Cell, Definition, Experiment, cell_definition, define, describe
 from ..metrics import join_summaries, summarize_cell
 from ..world import ForeignRobot
 from .config_file import CONFIG, read_definition, read_experiment
@@ -256,6 +256,12 @@ class Results:
         """SHA-256 of all strides there are, as the manifest has them."""
         return self.manifest.digest([_strides_name(cell) for cell in self.experiment.cells()])
 
+    @property
+    def _summary_source(self) -> str:
+        """What the summary is computed from: strides, and metrics of one's own."""
+        own = describe(self.experiment.metrics)
+        return self.strides_digest if not own else sha256(f"{self.strides_digest}{own}")
+
     def summary(self) -> pd.DataFrame:
         """The summary: a row a number, see `compare.metrics`.
 
@@ -267,12 +273,14 @@ class Results:
         """
         if (kept := self._summaries.get(self._digests)) is not None:
             return kept.copy()
-        summary = read_summary(self.manifest, made_of=self.strides_digest)
+        summary = read_summary(self.manifest, made_of=self._summary_source)
         if summary is None:
             cells = self.experiment.cells()
-            summary = join_summaries(summarize_cell(self.strides(cell)) for cell in cells)
+            summary = join_summaries(
+                summarize_cell(self.strides(cell), self.experiment.own_metrics) for cell in cells
+            )
             with contextlib.suppress(FileProblem), locked(self.folder):
-                write_summary(self.manifest, summary, made_of=self.strides_digest)
+                write_summary(self.manifest, summary, made_of=self._summary_source)
         return self._keep(summary)
 
     def write_summary(self, summary: pd.DataFrame) -> None:
@@ -281,7 +289,7 @@ class Results:
         Raises:
             FileProblem: It cannot be written.
         """
-        write_summary(self.manifest, summary, made_of=self.strides_digest)
+        write_summary(self.manifest, summary, made_of=self._summary_source)
         self._keep(summary)
 
     def _keep(self, summary: pd.DataFrame) -> pd.DataFrame:
@@ -292,7 +300,7 @@ class Results:
     @property
     def _digests(self) -> tuple[str, str]:
         """Digests of the strides and of the summary, by which it is known."""
-        return self.strides_digest, self.manifest.digest([SUMMARY])
+        return self._summary_source, self.manifest.digest([SUMMARY])
 
 
 def _strides_name(cell: Cell) -> str:

@@ -132,6 +132,8 @@ def motion(table: Overview) -> pd.DataFrame:
         )
         cells["speed error [m/s]"] = number(row.speed_error, ".3f")
         cells["apex error [mm]"] = number(1e3 * row.apex_error, ".1f")
+        for metric, (value, unit) in row.own.items():
+            cells[f"{metric} [{unit}]"] = number(value, ".4g")
         cells["upright"] = f"{row.upright} of {row.robots}"
         rows[LABELS.get(name, name)] = cells
     return pd.DataFrame.from_dict(rows, orient="index")

@@ -12,9 +12,20 @@ import numpy as np
 import pytest
 
 from pronk_pin import cli
-from pronk_pin.compare import Experiment, Results, Scenario, Schedule, load_scenario, run_experiment
+from pronk_pin.compare import (
+    Experiment,
+    Metric,
+    Results,
+    Scenario,
+    Schedule,
+    load_scenario,
+    run_cell,
+    run_experiment,
+    summarize,
+)
 from pronk_pin.compare.experiment import define, read_config
 from pronk_pin.compare.experiment.description import Unloaded, describe, restore
+from pronk_pin.compare.metrics import METRICS
 from pronk_pin.control import CONTROLLERS, ControllerSpec, PDTypeILC, load_controller
 from pronk_pin.errors import FileProblem, InvalidInput, UnknownName
 from pronk_pin.gait import load_library
@@ -23,7 +34,7 @@ from pronk_pin.robot import ROBOTS, RobotSpec
 LABORATORY = """
 from dataclasses import dataclass
 
-from pronk_pin.compare import Scenario
+from pronk_pin.compare import Metric, Scenario
 from pronk_pin.control import ControllerSpec
 
 
@@ -40,6 +51,11 @@ class Untold:
         return record.feedforward
 
 
+def hardest(strides):
+    return strides["tick_force"].sel(direction="z").max(("last", "part", "tick", "foot"))
+
+
+hardest_landing = Metric("hardest_landing", "N", hardest)
 controller = ControllerSpec("mine", law=MyLaw(0.3))
 untold = ControllerSpec("untold", law=Untold())
 hot = Scenario("hot", torque_constant=0.9, coulomb=0.4)
@@ -88,7 +104,6 @@ def test_what_is_stored_is_read_by_a_process_that_never_saw_the_class(laboratory
     elsewhere.mkdir()
     folder = str(results.folder.resolve())
     for command in (
-        ["report", folder],
         ["compare", "--folder", folder],
         ["report", folder, folder],
     ):
@@ -216,6 +231,64 @@ def test_what_is_named_in_vain_says_so(laboratory: str) -> None:
         Experiment(controllers=(ControllerSpec("ilc"),))
     with pytest.raises(InvalidInput, match="none of them twice"):
         own(laboratory, controllers=(f"{laboratory}:controller", ControllerSpec("mine")))
+
+
+def test_a_metric_of_ones_own_is_in_summary_tables_and_comparisons(
+    laboratory: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain = own(laboratory, controllers=("pd", "ilc"), scenarios=("nominal",))
+    with_metric = replace(plain, metrics=(f"{laboratory}:hardest_landing",))
+    folder = Path("result")
+    results = run_experiment(plain, folder, workers=1, progress=False)
+    before = {path.name: path.stat().st_mtime_ns for path in folder.glob("strides/*.nc")}
+    results = run_experiment(with_metric, folder, workers=1, progress=False)
+    assert before == {path.name: path.stat().st_mtime_ns for path in folder.glob("strides/*.nc")}
+    rows = results.summary().query("metric == 'hardest_landing'")
+    assert set(rows["unit"]) == {"N"}
+    for row in rows.itertuples():
+        strides = results.strides(results.find(controller=str(row.controller)))
+        force = strides["tick_force"].sel(direction="z").to_numpy()
+        assert row.value == pytest.approx(np.nanmax(force))
+    assert cli.main(["report", str(folder)]) == 0
+    assert "hardest_landing [N]: " in capsys.readouterr().out
+    assert "hardest_landing [N]" in (folder / "report.html").read_text()
+    assert cli.main(["report", str(folder), str(folder)]) == 0
+    assert "hardest_landing" in capsys.readouterr().out
+    done = _pronk_pin(["report", str(folder.resolve())], Path("/"))  # nobody has the function there
+    assert done.returncode == 0, done.stderr
+    (folder / "summary.csv").unlink()
+    done = _pronk_pin(["report", str(folder.resolve())], Path("/"))
+    assert f"module {laboratory} cannot be imported" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("compute", "words"),
+    [
+        (lambda strides: [1.0, 2.0, 3.0], r"of shape \(3,\); let it answer one for each of the 1"),
+        (lambda strides: "much", "answers no numbers"),
+    ],
+)
+def test_what_a_metric_answers_is_checked(compute: object, words: str) -> None:
+    metric = Metric("mine", "1", compute)  # type: ignore[arg-type]
+    experiment = Experiment(speeds=(0.3,), controllers=("pd",), schedule=SHORT, metrics=(metric,))
+    with pytest.raises(InvalidInput, match=words):
+        summarize(run_cell(experiment.cells()[0]), experiment.own_metrics)
+
+
+def test_metrics_have_names_of_their_own() -> None:
+    with pytest.raises(InvalidInput, match="is one of ours"):
+        Metric("peak_error", "rad", np.mean)
+    with pytest.raises(InvalidInput, match="cannot be called"):
+        Metric("mine", "rad", 3)  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match="none of them twice"):
+        Experiment(metrics=(Metric("mine", "1", np.mean), Metric("mine", "1", np.max)))
+
+
+def test_our_metrics_are_listed_with_their_units(laboratory: str) -> None:
+    experiment = own(laboratory, controllers=("pd", "ilc", "model"), scenarios=("nominal",))
+    summary = run_experiment(experiment, "all", workers=1, progress=False).summary()
+    for metric, unit in set(zip(summary["metric"], summary["unit"], strict=True)):
+        assert METRICS[metric][0] == unit
 
 
 def test_scenarios_are_added() -> None:

@@ -93,7 +93,7 @@ def test_two_results_are_told_apart_in_words(comparison: Results, tmp_path: Path
     text = format_changes(comparison, other)
     assert "seeds: 0 -> 0 1" in text
     assert "-> another commit" in text
-    assert "0 of 6 mean peak errors changed beyond noise" in text
+    assert "0 of 6 means changed beyond noise" in text
     assert "6 are the same to the bit." in text
     table = pd.read_csv(path)
     worse = (table["controller"] == "pd") & (table["metric"] == "upright")

@@ -285,7 +285,7 @@ def test_changes_between_the_fallen_are_none(copy: Results, comparison: Results)
     assert text.count("worse (+2 fell)") == 6
     assert not re.search(r"\b(nan|inf)\b", text)
     text = format_changes(copy, copy)
-    assert "0 of 6 mean peak errors changed" in text
+    assert "0 of 6 means changed" in text
     assert "Of 6 nothing is concluded: no robot stayed up in both." in text
 
 
