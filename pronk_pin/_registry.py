@@ -8,8 +8,10 @@ the program was started in.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import importlib.metadata
+import inspect
 import re
 import sys
 from collections.abc import Mapping
@@ -71,6 +73,31 @@ def _announced(kind: str) -> dict[str, str]:
 def is_address(name: str) -> bool:
     """Whether a name is an address, `module:object`."""
     return _ADDRESS.fullmatch(name) is not None
+
+
+def function_address(name: str, value: object) -> str:
+    """The address of a function, from the function itself or its address; empty without one.
+
+    Raises:
+        InvalidInput: It is neither, or is one that cannot be imported by name.
+    """
+    if inspect.isfunction(value):
+        module = "__main__" if value.__module__ == "__mp_main__" else value.__module__
+        value = f"{module}:{value.__qualname__}"
+    if not isinstance(value, str) or (value and not is_address(value)):
+        raise InvalidInput(
+            f"{name}={value!r} is no function that can be found by name; give one that stands in a "
+            "module, or its address, module:function"
+        )
+    return value
+
+
+def source_sha256(thing: object) -> str:
+    """SHA-256 of the module that a class or function comes from; "unknown" without a file."""
+    try:
+        return hashlib.sha256(Path(inspect.getfile(thing)).read_bytes()).hexdigest()  # type: ignore[arg-type]
+    except (OSError, TypeError):
+        return "unknown"  # typed in by hand, or compiled
 
 
 def imported(address: str) -> object:

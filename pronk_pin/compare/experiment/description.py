@@ -19,12 +19,11 @@ import numpy as np
 
 from ... import __name__ as _OURS
 from ... import control, robot
-from ..._registry import imported, is_address
+from ..._registry import imported, is_address, source_sha256
 from ..._typing import Array
 from ...control import StrideRecord, feedback, learning, signals, tick_control
 from ...control.signals import ControlContext
 from ...errors import InvalidInput
-from ...storage import sha256
 from .. import metrics, world
 
 Description: TypeAlias = dict[str, Any]
@@ -68,11 +67,7 @@ def _origin(thing: Any) -> Description:
         module = _SCRIPT
     if module.partition(".")[0] == _OURS:
         return {"class": name}
-    try:
-        source = sha256(Path(inspect.getfile(thing)).read_bytes())
-    except (OSError, TypeError):
-        source = "unknown"  # typed in by hand, or compiled
-    return {"class": f"{module}:{name}", "source_sha256": source}
+    return {"class": f"{module}:{name}", "source_sha256": source_sha256(thing)}
 
 
 @dataclass(frozen=True)

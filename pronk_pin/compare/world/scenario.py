@@ -31,7 +31,14 @@ from ..._checks import (
     whole,
 )
 from ..._checks import seed as known_seed
-from ..._registry import announced_names, find, is_address
+from ..._registry import (
+    announced_names,
+    find,
+    function_address,
+    imported,
+    is_address,
+    source_sha256,
+)
 from ...errors import InvalidInput, UnknownName
 from ...robot import ROTOR
 from ...storage import from_text
@@ -114,6 +121,9 @@ class Scenario:
         seed: Draws the heights of rough ground and of steps.
         timestep: Time step of the simulation and of the control [s].
         mjcf: Path of an MJCF that stands in for the robot's own URDF; empty for the URDF.
+        edit: Address, module:function, of a function that changes the world's `mujoco.MjSpec`
+            before it is compiled: terrain, another foot, springs. In Python the function itself.
+        edit_sha256: SHA-256 of its module, by default as it is now; another one is refused.
     """
 
     name: str
@@ -143,6 +153,8 @@ class Scenario:
     seed: int = 0
     timestep: float = 0.001
     mjcf: str = ""
+    edit: str = ""
+    edit_sha256: str = ""
 
     def __post_init__(self) -> None:
         file_name("name of a scenario", self.name)
@@ -155,6 +167,10 @@ class Scenario:
         object.__setattr__(self, "seed", known_seed(f"{prefix}seed", self.seed))
         instance_of(f"{prefix}sensors", self.sensors, Sensors)
         text(f"{prefix}mjcf", self.mjcf)
+        object.__setattr__(self, "edit", function_address(f"{prefix}edit", self.edit))
+        text(f"{prefix}edit_sha256", self.edit_sha256)
+        if self.edit and not self.edit_sha256:
+            object.__setattr__(self, "edit_sha256", source_sha256(imported(self.edit)))
         self._check_ground()
         self._check_motors()
         for name in ("delay", "touchdown_latency", "touchdown_jitter"):

@@ -17,8 +17,10 @@ import mujoco.rollout
 import numpy as np
 
 from ..._checks import Interval, instance_of, known_name, none_or, whole
+from ..._registry import imported, source_sha256
 from ..._typing import Array, BoolArray, IntArray
 from ...control import Gains
+from ...errors import InvalidInput
 from ...robot import BASES, Robot, as_robot
 from ...robot.formats import mujoco_spec
 from .ground import add_ground, name_feet
@@ -70,7 +72,26 @@ def build_model(
     _add_motors(spec, robot, scenario, servo)
     name_feet(spec, robot)
     add_ground(spec, robot, scenario)
-    return spec.compile()
+    return _edited(spec, scenario) if scenario.edit else spec.compile()
+
+
+def _edited(spec: mujoco.MjSpec, scenario: Scenario) -> mujoco.MjModel:
+    """Compile a world that the scenario's own function has changed."""
+    function = imported(scenario.edit)
+    if source_sha256(function) != scenario.edit_sha256:
+        raise InvalidInput(
+            f"scenario '{scenario.name}': the module of {scenario.edit} has changed since; put the "
+            "old one back, or take another folder"
+        )
+    if not callable(function):
+        raise InvalidInput(f"scenario '{scenario.name}': edit {scenario.edit} cannot be called")
+    try:
+        function(spec)
+        return spec.compile()
+    except Exception as error:  # whatever a user's function does
+        raise InvalidInput(
+            f"scenario '{scenario.name}': {scenario.edit} ends in {type(error).__name__}: {error}"
+        ) from error
 
 
 def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario, servo: Gains | None) -> None:

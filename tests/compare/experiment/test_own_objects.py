@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pronk_pin import cli
+from pronk_pin import cli, load_robot
 from pronk_pin.compare import (
     Experiment,
     Metric,
     Results,
     Scenario,
     Schedule,
+    build_model,
     load_scenario,
     run_cell,
     run_experiment,
@@ -60,6 +61,19 @@ controller = ControllerSpec("mine", law=MyLaw(0.3))
 untold = ControllerSpec("untold", law=Untold())
 hot = Scenario("hot", torque_constant=0.9, coulomb=0.4)
 number = 3
+
+
+def heavier_rotors(spec):
+    for joint in spec.joints:
+        if "calf" in joint.name:
+            joint.armature += 0.01
+
+
+def broken(spec):
+    spec.worldbody.add_geom(size=[-1, 0, 0])
+
+
+heavy = Scenario("heavy", edit=heavier_rotors)
 """
 
 SHORT = Schedule(startup=0.2, baseline=1.0, learning=1.5)
@@ -282,6 +296,29 @@ def test_metrics_have_names_of_their_own() -> None:
         Metric("mine", "rad", 3)  # type: ignore[arg-type]
     with pytest.raises(InvalidInput, match="none of them twice"):
         Experiment(metrics=(Metric("mine", "1", np.mean), Metric("mine", "1", np.max)))
+
+
+def test_a_scenario_may_edit_the_world(laboratory: str, tmp_path: Path) -> None:
+    heavy = load_scenario(f"{laboratory}:heavy")
+    assert heavy.edit == f"{laboratory}:heavier_rotors"
+    robot = load_robot("a1")
+    plain, edited = (build_model(robot, each) for each in (load_scenario("ideal"), heavy))
+    calf = plain.joint("FL_calf_joint").dofadr[0]
+    assert (plain.dof_armature[calf], edited.dof_armature[calf]) == (0.0, 0.01)
+    experiment = own(laboratory, controllers=("pd",), scenarios=("ideal", heavy, heavy + "slope"))
+    results = run_experiment(experiment, "heavier_rotors", workers=2, progress=False)
+    assert len(results.summary().query("metric == 'peak_error'")["value"].unique()) == 9
+    folder = str(results.folder.resolve())
+    elsewhere = _pronk_pin(["compare", "--folder", folder], Path("/"))
+    assert elsewhere.returncode == 0, elsewhere.stderr
+    assert Results.load(folder).experiment.scenario("heavy") == heavy
+    changed = replace(heavy, edit_sha256="0" * 64)
+    with pytest.raises(InvalidInput, match="has changed since; put the old one back"):
+        build_model(robot, changed)
+    with pytest.raises(InvalidInput, match=r"scenario 'x': .*broken ends in ValueError"):
+        build_model(robot, Scenario("x", edit=f"{laboratory}:broken"))
+    with pytest.raises(InvalidInput, match="no function that can be found by name"):
+        Scenario("x", edit=lambda spec: None)  # type: ignore[arg-type]
 
 
 def test_our_metrics_are_listed_with_their_units(laboratory: str) -> None:
