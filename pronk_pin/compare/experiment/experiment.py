@@ -16,7 +16,7 @@ from tyro.conf import Suppress
 from tyro.constructors import PrimitiveConstructorSpec
 
 from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
-from ...control import CONTROLLERS, ControllerSpec, load_controller
+from ...control import CONTROLLERS, PARTS, ControllerSpec, load_controller
 from ...errors import InvalidInput
 from ...gait import SPEEDS, STYLES, Gait, GaitLibrary, load_library
 from ...robot import (
@@ -99,8 +99,7 @@ class Experiment:
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         mjcf: MJCF of the robot, with the same joint names, that stands in for its URDF in the
             simulation; see `compare.world.mjcf`. The scenarios add to what is in it: "ideal" takes
-            it
-            as it is. The file is read when the experiment is run, and not before.
+            it as it is. The file is read when the experiment is run, and not before.
         schedule: What happens when.
         metrics: Metrics of one's own, beside ours: `Metric` objects, or their addresses.
         batches: Speeds that are simulated together, in the order in which they were added to a
@@ -146,7 +145,13 @@ class Experiment:
         if self.mjcf:
             keep(self, "mjcf", str(Path(self.mjcf).expanduser().resolve()))
         keep(self, "speeds", tuple(sorted(self.speeds)))
-        _ = self.planned  # there is a gait of each speed
+        for gait in self.planned:  # there is one of each speed
+            names = tuple(phase.name for phase in gait.phases)
+            if names != PARTS:
+                raise InvalidInput(
+                    f"these gaits have the phases {', '.join(names)}, and comparisons play "
+                    f"{' and '.join(PARTS)} only; choose gaits 'pronk'"
+                )
         self._sort_batches()
 
     def __hash__(self) -> int:

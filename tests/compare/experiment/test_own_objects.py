@@ -389,5 +389,7 @@ def test_gaits_and_robots_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixt
 def test_gaits_of_another_base_are_refused() -> None:
     with pytest.raises(InvalidInput, match="planned for base 'locked', and base 'free' needs"):
         Experiment(gaits=load_library("a1"), base="free")
+    with pytest.raises(InvalidInput, match="comparisons play stance and flight only; choose"):
+        Experiment(gaits="bound", speeds=(0.3,), base="free")
     with pytest.raises(InvalidInput, match=r"which ends in \.npz"):
         Experiment(gaits="trot")
