@@ -1,14 +1,13 @@
 """Objects by name: those that are shipped, those that installed packages announce as entry points,
 and any at an address, `module:object`.
 
-An entry point of the group `pronk_pin.controllers` (likewise `.robots`, `.scenarios`) is found by
-its name. An address is imported as Python imports: from what is installed, or from the folder that
-the program was started in.
+An entry point of the group `pronk_pin.controllers` (likewise `.robots`, `.scenarios`, `.metrics`)
+is found by its name. An address is imported as Python imports: from what is installed, or from the
+folder that the program was started in.
 """
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import importlib.metadata
 import inspect
@@ -21,6 +20,7 @@ from typing import TypeVar
 
 from ._checks import instance_of
 from .errors import InvalidInput, UnknownName
+from .storage import sha256 as digest
 
 T = TypeVar("T")
 
@@ -95,16 +95,20 @@ def function_address(name: str, value: object) -> str:
 def source_sha256(thing: object) -> str:
     """SHA-256 of the module that a class or function comes from; "unknown" without a file."""
     try:
-        return hashlib.sha256(Path(inspect.getfile(thing)).read_bytes()).hexdigest()  # type: ignore[arg-type]
+        return digest(Path(inspect.getfile(thing)).read_bytes())  # type: ignore[arg-type]
     except (OSError, TypeError):
         return "unknown"  # typed in by hand, or compiled
 
 
-def imported(address: str) -> object:
+def imported(address: str, *, sha256: str = "") -> object:
     """Import the object at an address.
 
+    Args:
+        address: Its address.
+        sha256: `source_sha256` that it has to have; by default any.
+
     Raises:
-        InvalidInput: The module cannot be imported, or has no such object.
+        InvalidInput: The module cannot be imported, has no such object, or is another one.
     """
     module, _, qualified_name = address.partition(":")
     if (here := str(Path.cwd())) not in sys.path:
@@ -124,4 +128,9 @@ def imported(address: str) -> object:
         if not hasattr(found, name):
             raise InvalidInput(f"{address}: {module} has no {qualified_name}; correct the address")
         found = getattr(found, name)
+    if sha256 and source_sha256(found) != sha256:
+        raise InvalidInput(
+            f"the module of {address} has changed since; put the old one back, or take another "
+            "folder"
+        )
     return found

@@ -170,7 +170,10 @@ class Explain:
         cell = results.find(controller=self.controller, scenario=self.scenario)
         strides = results.all_strides(controller=self.controller, scenario=self.scenario)
         rng = np.random.default_rng(self.seed)
-        explanation = explain(strides, imu_noise=self.imu_noise, draws=self.draws, rng=rng)
+        gaits = results.experiment.planned_at(strides["speed"].to_numpy().tolist())
+        explanation = explain(
+            strides, gaits=gaits, imu_noise=self.imu_noise, draws=self.draws, rng=rng
+        )
         text = describe(explanation)
         print(f"{cell.controller} in scenario {cell.scenario}\n\n{text}")
         if self.figure is not None:
@@ -203,7 +206,7 @@ def command_line(experiment: Experiment) -> str:
             return f"pronk-pin compare --suite {name}"
     words = ["pronk-pin compare"]
     own = (experiment.robot, experiment.gaits, *experiment.controllers, *experiment.scenarios)
-    if not all(isinstance(value, str) for value in own):
+    if experiment.metrics or not all(isinstance(value, str) for value in own):
         return "pronk-pin compare --config config.json"
     words += [f"--robot {experiment.robot_name}"]
     words += [f"--gaits {experiment.gaits}"] if experiment.gaits != "pronk" else []

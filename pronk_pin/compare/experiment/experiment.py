@@ -7,13 +7,12 @@ What a cell gives depends on nothing but its description, so cells run in any or
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, TypeVar
+from typing import Annotated, Any, TypeAlias
 
 from tyro.conf import Suppress
-from tyro.constructors import PrimitiveConstructorSpec
 
 from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
 from ...control import CONTROLLERS, PARTS, ControllerSpec, load_controller
@@ -33,8 +32,7 @@ from ..metrics import Metric, load_metric
 from ..simulation import Schedule
 from ..world import Scenario, load_scenario, shipped_scenario
 from .description import describe
-
-_T = TypeVar("_T")
+from .entries import by_name, by_names, digest_of, name_of, named, shortest
 
 LEARNED = ("library", "identified")
 """Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
@@ -45,35 +43,11 @@ DEFAULT_CONTROLLERS = (
 )
 
 
-def _by_name(metavar: str) -> PrimitiveConstructorSpec[Any]:
-    """How the command line takes what is an object or a name: by its name."""
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar=metavar,
-        instance_from_str=lambda words: words[0],
-        is_instance=lambda value: True,
-        str_from_instance=lambda value: [_name(value)],
-    )
-
-
-def _by_names(metavar: str) -> PrimitiveConstructorSpec[Any]:
-    """The same of several."""
-    return PrimitiveConstructorSpec(
-        nargs="*",
-        metavar=metavar,
-        instance_from_str=lambda words: tuple(words),
-        is_instance=lambda value: True,
-        str_from_instance=lambda values: [_name(value) for value in values],
-    )
-
-
 Controllers: TypeAlias = Annotated[
-    tuple[str | ControllerSpec, ...], _by_names("[NAME|MODULE:OBJECT [...]]")
+    tuple[str | ControllerSpec, ...], by_names("[NAME|MODULE:OBJECT [...]]")
 ]
-Metrics: TypeAlias = Annotated[tuple[str | Metric, ...], _by_names("[MODULE:OBJECT [...]]")]
-Scenarios: TypeAlias = Annotated[
-    tuple[str | Scenario, ...], _by_names("[NAME|MODULE:OBJECT [...]]")
-]
+Metrics: TypeAlias = Annotated[tuple[str | Metric, ...], by_names("[MODULE:OBJECT [...]]")]
+Scenarios: TypeAlias = Annotated[tuple[str | Scenario, ...], by_names("[NAME|MODULE:OBJECT [...]]")]
 
 
 @dataclass(frozen=True)
@@ -106,8 +80,8 @@ class Experiment:
             results folder; empty for all at once.
     """
 
-    robot: Annotated[str | RobotSpec, _by_name("NAME|FILE|MODULE:OBJECT")] = "a1"
-    gaits: Annotated[str | GaitLibrary, _by_name("NAME|FILE")] = "pronk"
+    robot: Annotated[str | RobotSpec, by_name("NAME|FILE|MODULE:OBJECT")] = "a1"
+    gaits: Annotated[str | GaitLibrary, by_name("NAME|FILE")] = "pronk"
     apex: float | None = None
     speeds: tuple[float, ...] = SPEEDS
     controllers: Controllers = DEFAULT_CONTROLLERS
@@ -122,23 +96,23 @@ class Experiment:
     def __post_init__(self) -> None:
         keep = object.__setattr__
         self._check_types()
-        keep(self, "robot", _shortest("robot", load_robot_spec(self.robot), ROBOTS.get))
+        keep(self, "robot", shortest("robot", load_robot_spec(self.robot), ROBOTS.get))
         keep(self, "gaits", self._known_gaits())
         specs = [load_controller(value) for value in self.controllers]
         worlds = [load_scenario(value) for value in self.scenarios]
-        shortest = tuple(_shortest("controller", spec, CONTROLLERS.get) for spec in specs)
-        keep(self, "controllers", shortest)
-        keep(self, "scenarios", tuple(_shortest("scenario", w, shipped_scenario) for w in worlds))
+        keep_controllers = tuple(shortest("controller", spec, CONTROLLERS.get) for spec in specs)
+        keep(self, "controllers", keep_controllers)
+        keep(self, "scenarios", tuple(shortest("scenario", w, shipped_scenario) for w in worlds))
         keep(self, "metrics", tuple(load_metric(value) for value in self.metrics))
         if len({metric.name for metric in self.own_metrics}) < len(self.metrics):
             raise InvalidInput("metrics must name none of them twice")
-        named: dict[str, tuple[object, ...]] = {
+        lists: dict[str, tuple[object, ...]] = {
             "speeds": self.speeds,
             "controllers": self.controller_names,
             "scenarios": self.scenario_names,
             "seeds": self.seeds,
         }
-        for name, values in named.items():
+        for name, values in lists.items():
             if len(values) == 0 or len(set(values)) != len(values):
                 raise InvalidInput(f"{name} must name at least one, and none of them twice")
         self._check_controllers()
@@ -220,17 +194,17 @@ class Experiment:
     @property
     def robot_name(self) -> str:
         """Name of the robot."""
-        return _name(self.robot)
+        return name_of(self.robot)
 
     @property
     def controller_names(self) -> tuple[str, ...]:
         """Names of the controllers."""
-        return tuple(map(_name, self.controllers))
+        return tuple(map(name_of, self.controllers))
 
     @property
     def scenario_names(self) -> tuple[str, ...]:
         """Names of the scenarios."""
-        return tuple(map(_name, self.scenarios))
+        return tuple(map(name_of, self.scenarios))
 
     @property
     def own_metrics(self) -> tuple[Metric, ...]:
@@ -239,11 +213,11 @@ class Experiment:
 
     def controller(self, name: str) -> ControllerSpec:
         """The controller of a name: one of the experiment's, or a shipped one."""
-        return load_controller(_find(self.controllers, name))
+        return load_controller(named(self.controllers, name))
 
     def scenario(self, name: str) -> Scenario:
         """The scenario of a name."""
-        return load_scenario(_find(self.scenarios, name))
+        return load_scenario(named(self.scenarios, name))
 
     @property
     def model(self) -> Robot:
@@ -299,7 +273,7 @@ class Experiment:
         ]
         for kind in ("controllers", "scenarios", "metrics"):
             there, here = (
-                {_name(value): describe(value) for value in getattr(each, kind)}
+                {name_of(value): describe(value) for value in getattr(each, kind)}
                 for each in (self, other)
             )
             changed = [name for name in there if here.get(name, there[name]) != there[name]]
@@ -315,7 +289,7 @@ class Experiment:
             "scenarios",
             "metrics",
         ):  # live objects in place of those on record
-            both = {_name(v): v for v in (*getattr(self, kind), *getattr(other, kind))}
+            both = {name_of(v): v for v in (*getattr(self, kind), *getattr(other, kind))}
             more[kind] = tuple(both.values())
         added = tuple(speed for speed in other.speeds if speed not in self.speeds)
         batches = (*(self.batches or (self.speeds,)), added) if added else self.batches
@@ -337,43 +311,15 @@ class Experiment:
         )
 
 
-def _name(value: Any) -> str:
-    """Name of what is given by name or as an object; of a gait library, its robot's."""
-    return value if isinstance(value, str) else str(getattr(value, "name", None) or value.robot)
-
-
-def _find(values: Iterable[_T], name: str) -> _T | str:
-    """The one of a name; the name itself without one."""
-    return next((value for value in values if _name(value) == name), name)
-
-
-def _shortest(kind: str, value: _T, shipped: Callable[[str], _T | None]) -> str | _T:
-    """The name of what is shipped; else the object itself, whose name must not be taken."""
-    name = _name(value)
-    known = shipped(name)
-    if known is None:
-        return value
-    if describe(known) != describe(value):
-        raise InvalidInput(
-            f"{kind} '{name}' is not the one that is shipped under that name; give yours another "
-            "name"
-        )
-    return name
-
-
 def _fixed(one: Experiment, other: Experiment) -> Iterator[tuple[str, object, object]]:
     """What cannot be added to: name, and its value in either of two experiments."""
     yield "robot", describe(one.robot), describe(other.robot)
-    yield "gaits", _digest(one.gaits), _digest(other.gaits)
+    yield "gaits", digest_of(one.gaits), digest_of(other.gaits)
     for name in ("apex", "base", "mjcf"):
         yield name, getattr(one, name), getattr(other, name)
     for part in dataclasses.fields(Schedule):
         name = part.name
         yield f"schedule.{name}", getattr(one.schedule, name), getattr(other.schedule, name)
-
-
-def _digest(gaits: str | GaitLibrary) -> str:
-    return gaits if isinstance(gaits, str) else gaits.sha256
 
 
 @dataclass(frozen=True)
@@ -423,8 +369,8 @@ class Cell:
         return dataclasses.replace(
             experiment,
             speeds=self.speeds,
-            controllers=(_find(experiment.controllers, self.controller),),
-            scenarios=(_find(experiment.scenarios, self.scenario),),
+            controllers=(named(experiment.controllers, self.controller),),
+            scenarios=(named(experiment.scenarios, self.scenario),),
             seeds=(self.seed,),
             batches=(),
         )

@@ -17,7 +17,7 @@ import mujoco.rollout
 import numpy as np
 
 from ..._checks import Interval, instance_of, known_name, none_or, whole
-from ..._registry import imported, source_sha256
+from ..._registry import imported
 from ..._typing import Array, BoolArray, IntArray
 from ...control import Gains
 from ...errors import InvalidInput
@@ -77,12 +77,7 @@ def build_model(
 
 def _edited(spec: mujoco.MjSpec, scenario: Scenario) -> mujoco.MjModel:
     """Compile a world that the scenario's own function has changed."""
-    function = imported(scenario.edit)
-    if source_sha256(function) != scenario.edit_sha256:
-        raise InvalidInput(
-            f"scenario '{scenario.name}': the module of {scenario.edit} has changed since; put the "
-            "old one back, or take another folder"
-        )
+    function = imported(scenario.edit, sha256=scenario.edit_sha256)
     if not callable(function):
         raise InvalidInput(f"scenario '{scenario.name}': edit {scenario.edit} cannot be called")
     try:

@@ -26,11 +26,10 @@ import numpy as np
 
 from ..._checks import Interval, keep_reals
 from ..._typing import Array, BoolArray
-from ...errors import InvalidInput
 from ...gait import Gait
 from ...robot import Robot, with_rotors
 from ..signals import ControlContext
-from .level_robot import TRUNK, LevelRobot, cheapest_forces
+from .level_robot import TRUNK, LevelRobot, cheapest_forces, check_level
 from .tick_controller import Observation, TickController
 
 _CHECKS = {
@@ -76,11 +75,7 @@ class ComputedTorqueControl(TickController):
     """
 
     def __init__(self, settings: ComputedTorque, context: ControlContext) -> None:
-        if context.base != "locked":
-            raise InvalidInput(
-                f"controller '{context.controller}' computes torques of trunks that are locked to "
-                f"x and z; base='{context.base}' needs another one, such as 'pd' or 'ilc'"
-            )
+        check_level(context)
         self.model = LevelRobot(with_rotors(context.robot))
         self._omega, self._least_load = settings.omega, settings.least_load
         self._trunk = np.stack(

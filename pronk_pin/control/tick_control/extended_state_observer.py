@@ -37,11 +37,10 @@ import numpy as np
 
 from ..._checks import Interval, keep_reals
 from ..._typing import Array, IntArray
-from ...errors import InvalidInput
 from ...gait import Gait
 from ...robot import Robot, with_rotors
 from ..signals import PARTS, ControlContext, clip_torque
-from .level_robot import TRUNK, LevelRobot
+from .level_robot import TRUNK, LevelRobot, check_level
 from .tick_controller import Observation, TickController
 
 _NODES = 33
@@ -90,11 +89,7 @@ class ExtendedStateObserverControl(TickController):
     """
 
     def __init__(self, settings: ExtendedStateObserver, context: ControlContext) -> None:
-        if context.base != "locked":
-            raise InvalidInput(
-                f"controller '{context.controller}' observes joints below trunks that are locked "
-                f"to x and z; base='{context.base}' needs another one, such as 'pd' or 'ilc'"
-            )
+        check_level(context)
         robot = with_rotors(context.robot)
         self._gains, self._tau_max, self._dt = context.gains, robot.tau_max, context.timestep
         pole = np.exp(-settings.bandwidth * context.timestep)

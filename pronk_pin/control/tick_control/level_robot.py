@@ -13,8 +13,10 @@ import numpy as np
 import pinocchio as pin
 
 from ..._typing import Array, BoolArray
+from ...errors import InvalidInput
 from ...kinematics import contact_points, leg_geometry
 from ...robot import NB, Robot
+from ..signals import ControlContext
 
 TRUNK = 2
 """Coordinates of a locked trunk: x and z."""
@@ -24,6 +26,19 @@ _ROWS = np.array([0, 2])
 
 _FORCE_WEIGHT = 1e-6
 """Cost of contact forces against joint torques [m^2], as in `inverse_dynamics`."""
+
+
+def check_level(context: ControlContext) -> None:
+    """Refuse robots whose trunks may turn.
+
+    Raises:
+        InvalidInput: The base is not locked.
+    """
+    if context.base != "locked":
+        raise InvalidInput(
+            f"controller '{context.controller}' reckons with trunks that are locked to x and z; "
+            f"base='{context.base}' needs another one, such as 'pd' or 'ilc'"
+        )
 
 
 class LevelRobot:

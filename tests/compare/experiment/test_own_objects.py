@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pronk_pin import cli, load_robot
+from pronk_pin.cli.comparison import command_line
 from pronk_pin.compare import (
     Experiment,
     Metric,
@@ -193,12 +194,16 @@ speeds: [0.0, 0.3]
 controllers:
   - pd
   - {laboratory}:controller
+  - {{name: strong, law: {{class: "{laboratory}:MyLaw", gain: 0.6}}}}
   - {{name: gentle, law: {{class: PDTypeILC, gain: 0.2}}, timing: {{}}}}
 scenarios: [nominal, {{name: moon, gravity: 1.62}}]
 schedule: {{baseline: 2.0, learning: 3.0}}
 """
     )
     read = read_config("mine.yaml")
+    strong = read.controller("strong").law
+    assert strong == type(read.controller("mine").law)(0.6)  # type: ignore[call-arg,misc]
+    assert "source_sha256" in describe(strong)
     assert read.controller("gentle").law == PDTypeILC(gain=0.2)
     assert read.controller("gentle").timing is not None
     assert read.scenario("moon") == Scenario("moon", gravity=1.62)
@@ -263,6 +268,7 @@ def test_a_metric_of_ones_own_is_in_summary_tables_and_comparisons(
         strides = results.strides(results.find(controller=str(row.controller)))
         force = strides["tick_force"].sel(direction="z").to_numpy()
         assert row.value == pytest.approx(np.nanmax(force))
+    assert command_line(results.experiment) == "pronk-pin compare --config config.json"
     assert cli.main(["report", str(folder)]) == 0
     assert "hardest_landing [N]: " in capsys.readouterr().out
     assert "hardest_landing [N]" in (folder / "report.html").read_text()
