@@ -56,11 +56,7 @@ def variants(name: str) -> dict[str, ControllerSpec]:
         f"x{m:g}": replace(
             spec,
             name=name if m == 1.0 else f"{name}_x{m:g}",
-            gains=replace(
-                spec.gains,
-                kp=tuple(m * k for k in spec.gains.kp),
-                kd=tuple(math.sqrt(m) * k for k in spec.gains.kd),
-            ),
+            stiffness=m,
         )
         for m in MULTIPLES
     }

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from pronk_pin import Robot, RobotSpec, load_robot
+from pronk_pin import Robot, load_robot
 from pronk_pin._typing import Array
 from pronk_pin.robot import ROBOTS
 from pronk_pin.robot.formats.urdf import mujoco_spec
@@ -30,28 +30,16 @@ def robot() -> Robot:
     return load_robot("a1")
 
 
-@pytest.fixture(scope="session", params=ROBOTS)
+@pytest.fixture(scope="session", params=[name for name, spec in ROBOTS.items() if spec.legs[2:]])
 def any_robot(request: pytest.FixtureRequest) -> Robot:
-    """Each of the robots that are known by name."""
+    """Each of the robots with four legs that are known by name."""
     return load_robot(request.param)
 
 
 @pytest.fixture(scope="session")
 def biped() -> Robot:
-    """A robot of one's own making: two legs, other names, feet without collision spheres."""
-    return load_robot(
-        RobotSpec(
-            "bolt",
-            "bolt_description/robots/bolt.urdf",
-            base_link="base_link",
-            legs=("FL", "FR"),
-            joints=("HAA", "HFE", "KFE"),
-            joint_pattern="{leg}_{joint}",
-            foot_pattern="{leg}_FOOT",
-            standing=(0.0, 0.8, -1.6),
-            foot_radius=0.01,
-        )
-    )
+    """Two legs, other names, feet without collision spheres."""
+    return load_robot("bolt")
 
 
 def draw_states(robot: Robot, n: int, *, seed: int = 0) -> States:

@@ -15,8 +15,8 @@ from .._checks import Interval, instance_of, known_name, real
 from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait, known_gaits
-from ..kinematics import rotate_leg
-from ..robot import BASES, NL, Robot, as_array, as_numbers
+from ..kinematics import leg_geometry, rotate_leg
+from ..robot import BASES, Robot, as_array, as_numbers
 from .controller_spec import ControllerSpec
 from .feedback import SpeedEstimator
 from .learning import (
@@ -57,9 +57,9 @@ TIMESTEP = Interval(1e-5, 0.01, "s")
 """Time steps of the control that make sense."""
 
 
-def _known_feedforward(feedforward: Array | None, n: int) -> Array:
+def _known_feedforward(feedforward: Array | None, n: int, joints: int) -> Array:
     """The feedforward to begin with [N m], shape (n, 2, samples, 12), copied; by default none."""
-    shape = (n, len(PARTS), SAMPLES, NL)
+    shape = (n, len(PARTS), SAMPLES, joints)
     if feedforward is None:
         return np.zeros(shape)
     feedforward = as_numbers("feedforward", feedforward)
@@ -82,6 +82,7 @@ class Controller:
     Attributes:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
+        gains: The feedback gains.
         balance: The balance of a trunk that may turn; None where it is locked.
         tick_loop: What asks the tick controller; None where tapes and gains make the torques.
         time: How long the controller has computed at events.
@@ -107,10 +108,11 @@ class Controller:
         known_name("base", base, BASES)
         n = len(gaits)
         self.robot, self.spec, self.gaits = robot, spec, tuple(gaits)
-        self.feedforward = _known_feedforward(feedforward, n)
+        self.gains = spec.gains_of(robot)
+        self.feedforward = _known_feedforward(feedforward, n, robot.nu)
         self.skipped = np.full(n, SKIPPED.index("duration unknown"), dtype=np.intp)
         self._timestep, self._base = timestep, base
-        self._last = tuple(StrideRecord.unknown(n) for _ in PARTS)
+        self._last = tuple(StrideRecord.unknown(n, robot.nu) for _ in PARTS)
         self._tilt = np.zeros((n, len(PARTS)))
         # Why a stance was none, index into `SKIPPED`.
         self._stance_verdict = np.zeros(n, dtype=np.intp)
@@ -134,6 +136,7 @@ class Controller:
         if spec.guard is not None:
             self.guard = GuardState(spec.guard, Memory(self.feedforward, self._flight.duration))
         self._always_retimes = flight is None and not any(self._laws)
+        self._thigh = leg_geometry(robot).sense[:, 1]  # sense in which the thighs turn legs back
         end = np.array([1.0])
         self._lift_off_speed = np.array(
             [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
@@ -143,13 +146,13 @@ class Controller:
         """What balance and the law of the stance are bound to."""
         spec, timestep = self.spec, self._timestep
         settings = StrideSettings(
-            spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
+            self.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks, timestep
         )
         return LawContext(
             robot=self.robot,
             gaits=self.gaits,
             controller=spec.name,
-            gains=spec.gains,
+            gains=self.gains,
             base=self._base,
             timestep=timestep,
             ticks=self.max_ticks,
@@ -230,12 +233,12 @@ class Controller:
         share, rate = share * turn, rate * turn / reference.duration[rows, None]
         position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
         velocity = reference.velocity[rows, ticks]
-        velocity[..., 1::3] += rate[..., None]
+        velocity[..., 1::3] += self._thigh * rate[..., None]
         acceleration, phase = self._of_the_tick(reference, rows, ticks)
         if acceleration is not None and phase is not None:
             curvature = self.spec.regulator.profile_curvature(phase)
             curvature *= turn / reference.duration[rows, None] ** 2
-            acceleration[..., 1::3] += curvature[..., None]
+            acceleration[..., 1::3] += self._thigh * curvature[..., None]
         tape = Tape(
             self._played(1, rows, ticks),
             position,
@@ -331,7 +334,7 @@ class Controller:
         rate = np.gradient(kept, self._timestep, axis=1)
         index = log.index(phase_grid(), reference.duration[rows] / self._timestep)
         kept, rate = resample(kept, index), resample(rate, index)
-        return record.less(kept, rate, self.spec.gains.feedback(kept, rate))
+        return record.less(kept, rate, self.gains.feedback(kept, rate))
 
     def _roll_back(self, rows: IntArray, usable: BoolArray) -> BoolArray:
         """Let the guard judge the last strides of robots that learn; those that grew go back.

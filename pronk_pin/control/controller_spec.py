@@ -19,6 +19,7 @@ from .._checks import (
 )
 from .._registry import find
 from ..errors import InvalidInput
+from ..robot import Robot
 from .feedback import SPEED_FILTER, AttitudeFilter, BalanceSpec, LegAngleRegulator
 from .learning import (
     FLIGHT_LAW,
@@ -44,6 +45,8 @@ from .tick_control import (
 SOURCES = ("none", "model", "library", "identified")
 """Sources of a controller's initial feedforward."""
 
+
+_STIFFNESS = Interval(0, 1e4)
 
 GAIT_MODELS = ("urdf", "datasheet", "identified")
 """Models that a controller's gaits may be optimised with."""
@@ -75,7 +78,8 @@ class ControllerSpec:
         guard: Guard of the learning, which goes back where errors grow; None lets them.
         timing: Adaptation of the flight's duration to the measured one; None plays it as planned.
             Without a law, and where no duration is given, it adapts from the first stride on.
-        gains: Feedback gains: eq. (9).
+        gains: Feedback gains, eq. (9); None for the robot's own, see `Gains.of`.
+        stiffness: Multiple of these gains' stiffness; the damping goes with its root.
         tick_controller: What computes the torques tick by tick, in place of the feedback gains, see
             `TickController`; None for these.
         regulator: Speed regulation: eq. (12).
@@ -99,7 +103,8 @@ class ControllerSpec:
     coupling: float = 1.0
     guard: LearningGuard | None = None
     timing: FlightTiming | None = None
-    gains: Gains = field(default_factory=Gains)
+    gains: Gains | None = None
+    stiffness: float = 1.0
     tick_controller: TickController | BindableTickController | None = None
     regulator: LegAngleRegulator = field(default_factory=LegAngleRegulator)
     balance: BalanceSpec = field(default_factory=BalanceSpec)
@@ -141,16 +146,23 @@ class ControllerSpec:
         keep_instances(
             self,
             prefix,
-            gains=Gains,
             regulator=LegAngleRegulator,
             balance=BalanceSpec,
             selection=StrideSelection,
             contact=ContactDetector,
             attitude_filter=AttitudeFilter,
         )
-        keep_reals(self, {"speed_filter": SPEED_FILTER, "coupling": SHARE}, prefix)
+        if self.gains is not None:
+            instance_of(f"{prefix}gains", self.gains, Gains, "a Gains, or None for the robot's own")
+        numbers = {"speed_filter": SPEED_FILTER, "coupling": SHARE, "stiffness": _STIFFNESS}
+        keep_reals(self, numbers, prefix)
         # Contacts are sensed a tick late.
         whole(f"{prefix}touchdown_ticks", self.touchdown_ticks, Interval(1, 50))
+
+    def gains_of(self, robot: Robot) -> Gains:
+        """The feedback gains with which it controls a robot."""
+        own = Gains.of(robot) if self.gains is None else self.gains
+        return own.scaled(self.stiffness)
 
     @property
     def laws(self) -> tuple[LearningLaw | None, ...]:
@@ -170,8 +182,8 @@ _ILC = ControllerSpec(
 
 _URDF, _IDENTIFIED = ("urdf",), ("urdf", "rotors", "friction", "load")
 
-_STIFF = Gains(kp=(140.0, 240.0, 360.0), kd=(2.0, 12.0, 4.0))
-"""Four times the paper's stiffness and twice its damping."""
+_STIFF = 4.0
+"""Four times the stiffness, and twice the damping."""
 
 _MODEL_ROTORS = ControllerSpec(
     "model+rotors",
@@ -180,6 +192,8 @@ _MODEL_ROTORS = ControllerSpec(
     timing=FlightTiming(),
     knows=("urdf", "rotors"),
 )
+
+_ILC_ROTORS = replace(_ILC, name="ilc+rotors", gait_model="datasheet", knows=("rotors",))
 
 _COMPUTED_TORQUE = ControllerSpec(
     "computed-torque",
@@ -220,13 +234,11 @@ CONTROLLERS = {
         ControllerSpec("model+timing", source="model", timing=FlightTiming(), knows=_URDF),
         _MODEL_ROTORS,
         replace(_MODEL_ROTORS, name="model+eso", tick_controller=ExtendedStateObserver()),
-        replace(_ILC, name="ilc+rotors", gait_model="datasheet", knows=("rotors",)),
-        ControllerSpec("pd-stiff", gains=_STIFF),
-        replace(_MODEL_ROTORS, name="model+rotors-stiff", gains=_STIFF),
-        replace(_ILC, name="ilc-stiff", gains=_STIFF),
-        replace(
-            _ILC, name="ilc+rotors-stiff", gait_model="datasheet", gains=_STIFF, knows=("rotors",)
-        ),
+        _ILC_ROTORS,
+        ControllerSpec("pd-stiff", stiffness=_STIFF),
+        replace(_MODEL_ROTORS, name="model+rotors-stiff", stiffness=_STIFF),
+        replace(_ILC, name="ilc-stiff", stiffness=_STIFF),
+        replace(_ILC_ROTORS, name="ilc+rotors-stiff", stiffness=_STIFF),
         _COMPUTED_TORQUE,
         _WHOLE_BODY_QP,
         replace(

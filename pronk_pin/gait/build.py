@@ -2,7 +2,8 @@
 
 Each gait is a file of its own as soon as it is solved and audited, so that a build which was
 interrupted goes on where it was. A gait starts from the solution of its neighbour on the way to the
-slowest gait at the home apex; where there is none, or that fails, from a crude guess.
+slowest gait at the home apex; where there is none, or that fails, from a crude guess. Where an
+audit finds the mesh or the polynomials too coarse for a robot, all gaits are solved on finer ones.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -31,6 +32,7 @@ from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
 from ..robot import Base, Robot, RobotSpec, as_robot, load_robot
 from ..storage import clear_partial_files, read_arrays, temporary_folder, write_arrays
 from .audit import audit, bezier_orders
+from .checks import RESOLUTION
 from .library import PER_GAIT, SCHEMA, GaitLibrary, from_arrays, to_arrays
 from .optimisation import GaitSolution, SolverState, check_ballistics, optimize_gait
 from .problem import GaitProblem
@@ -65,7 +67,7 @@ def build_library(
     progress: bool = True,
     **changes: Any,
 ) -> GaitLibrary:
-    """Optimise and audit a gait for each speed at each apex.
+    """Optimise and audit a gait for each speed at each apex, on a mesh that is fine enough for all.
 
     Args:
         robot: The robot.
@@ -79,10 +81,11 @@ def build_library(
         workers: Processes; None for one for each core. A script that asks for more than one must
             guard its own main code with `if __name__ == "__main__"`.
         progress: Whether to show a progress bar.
-        changes: Other attributes of `GaitProblem`.
+        changes: Other attributes of `GaitProblem`; with a `sequence` its mesh is kept.
 
     Raises:
-        InvalidInput: There are no speeds or heights, or no workers.
+        InvalidInput: There are no speeds or heights, a height at which the trunk stands, or no
+            workers.
         UnknownName: There is no such gait.
         GaitNotFound: A gait was not found, from its neighbour or from the crude guess. Those that
             were found are in the folder.
@@ -91,32 +94,67 @@ def build_library(
     """
     began = time.perf_counter()
     style = load_style(gait)
-    as_robot(robot)
+    apex = style.apex_of(as_robot(robot))
     speeds = reals("speeds", style.speeds if speeds is None else speeds)
-    apexes = reals("apex", (style.apex,) if apexes is None else apexes)
+    apexes = reals("apex", (apex,) if apexes is None else apexes)
     if not speeds or not apexes:
         raise InvalidInput("no speeds or no apex to build gaits for; give at least one of each")
     workers = worker_count(workers)
     if path is not None:
         path = known_path("path", path)
-    parents = _outward(speeds, apexes, style.apex)
+    parents = _outward(speeds, apexes, apex)
     with _folder(folder) as place:
-        tasks = {
-            key: _Task(
-                gait_problem(robot, key[0], gait=gait, base=base, **{**changes, "apex": key[1]}),
-                place / f"speed{key[0]:+.3f}_apex{key[1]:.4f}.npz",
-            )
-            for key in parents
-        }
-        for task in tasks.values():
-            check_ballistics(task.problem)
-        _solve_all(tasks, parents, workers, progress, keeps=folder is not None)
-        solved = {key: _read(task) for key, task in tasks.items()}
-    library = _library(robot, gait, solved, tasks, _home(apexes, style.apex))
+        for mesh in MESHES[:1] if "sequence" in changes else MESHES:
+            tasks = {}
+            for v, h in parents:
+                problem = gait_problem(robot, v, gait=gait, base=base, **{**changes, "apex": h})
+                problem, name = mesh.of(problem), f"speed{v:+.3f}_apex{h:.4f}{mesh.suffix}.npz"
+                check_ballistics(problem)
+                tasks[v, h] = _Task(problem, place / name)
+            _solve_all(tasks, parents, workers, progress, keeps=folder is not None)
+            solved = {key: _read(task) for key, task in tasks.items()}
+            if not any(_too_coarse(each) for each in solved.values()):
+                break
+    library = _library(robot, gait, solved, tasks, _home(apexes, apex))
     library.metadata["build_time"] = round(time.perf_counter() - began, 2)  # type: ignore[index]
     if path is not None:
         library.save(path)
     return library
+
+
+class Mesh(NamedTuple):
+    """A mesh for the phases of a gait, beside that of its style.
+
+    Attributes:
+        intervals: Factor of the numbers of mesh intervals.
+        order: What comes on top of the polynomials' order, as a share of it.
+        suffix: What the files of its gaits end in.
+    """
+
+    intervals: float
+    order: float
+    suffix: str
+
+    def of(self, problem: GaitProblem) -> GaitProblem:
+        """The problem on this mesh."""
+        sequence = tuple(
+            dataclasses.replace(
+                phase,
+                intervals=2 * round(self.intervals * phase.intervals / 2),
+                order=round((1.0 + self.order) * phase.order),
+            )
+            for phase in problem.sequence
+        )
+        return dataclasses.replace(problem, sequence=sequence)
+
+
+MESHES = (Mesh(1.0, 0.0, ""), Mesh(1.4, 0.35, "_fine"), Mesh(2.2, 0.6, "_finest"))
+"""Meshes that are tried in turn, until the audits find nothing too coarse."""
+
+
+def _too_coarse(solved: _Solved) -> bool:
+    """Whether an audit fails by something that a finer mesh may mend."""
+    return any(check.name in RESOLUTION for each in solved.library.audit for check in each.failures)
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ class Limit(NamedTuple):
 CHECKS: Mapping[str, Limit] = {
     "18-DoF residual": Limit("N or N m", 1e-8),
     "guide": Limit("N or N m"),
-    "mirror symmetry": Limit("m", 1e-12),
+    "mirror symmetry": Limit("m", 1e-10),
     "apex error": Limit("m", 1e-4),
     "contact height drift": Limit("m", 2e-6),
     "contact slip": Limit("m/s", 1e-4),
@@ -67,6 +67,11 @@ CHECKS: Mapping[str, Limit] = {
     "ground force": Limit("N"),
 }
 """The independent checks: unit, and what passes."""
+
+_COARSE = ("drift", "bezier", "contact slip", "convergence order", "apex error")
+
+RESOLUTION = tuple(name for name in CHECKS if any(word in name for word in _COARSE))
+"""The checks that a mesh or polynomials that are too coarse may fail."""
 
 _ROUND_OFF = 1e-9
 """A limit that a gait uses in full is not exceeded by round-off [of it]."""

@@ -17,7 +17,7 @@ from .._checks import path as known_path
 from .._typing import Array
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange
 from ..kinematics import Contact
-from ..robot import NL, ROBOTS, Base, Robot, load_robot
+from ..robot import ROBOTS, Base, Robot, load_robot
 from ..storage import StoredArrays, read_arrays, sha256, write_arrays
 from .checks import Audit, StoredAudit
 from .gait import ARRAYS, Gait, GaitPhase
@@ -292,13 +292,13 @@ def _gaits(arrays: StoredArrays, robot: str) -> tuple[Gait, ...]:
         durations = arrays.numbers(f"{name}.duration", n)
         if np.any(durations <= 0.0):
             raise arrays.damaged(f"{name} without duration")
-        joints = arrays.numbers(f"{name}.joints", n, NL, None)
+        joints = arrays.numbers(f"{name}.joints", n, None, None)
         order = joints.shape[-1]
         parts = [
             joints,
             arrays.numbers(f"{name}.base", n, 3, order),
-            arrays.numbers(f"{name}.tau", n, NL, order),
-            arrays.numbers(f"{name}.lam", n, 4, 3, order),
+            arrays.numbers(f"{name}.tau", n, joints.shape[1], order),
+            arrays.numbers(f"{name}.lam", n, None, 3, order),
         ]
         if not order:
             raise arrays.damaged(f"{name} without coefficients")

@@ -21,7 +21,7 @@ from .._checks import (
     whole,
 )
 from ..errors import InvalidInput
-from ..kinematics import CONTACTS, Contact
+from ..kinematics import CONTACTS, Contact, mirror
 from ..robot import Base, Robot, as_robot
 
 Pair = Literal["front", "rear"]
@@ -177,13 +177,13 @@ class GaitProblem:
         phases = sequence_of(
             "sequence", self.sequence, lambda name, phase: instance_of(name, phase, ContactPhase)
         )
-        keep(self, "sequence", phases)
+        keep(self, "sequence", _of_robot(self.robot, phases))
         if not self.apex > self.trunk_height:
             raise InvalidInput(
                 f"the apex, {self.apex:g} m, is not above the least trunk height, "
                 f"{self.trunk_height:g} m; raise the one or lower the other"
             )
-        _check_sequence(self.sequence)
+        _check_sequence(self.sequence, len(mirror(self.robot).pairs))
         least, most = (sum(phase.duration[end] for phase in phases) for end in (0, 1))
         if most < self.stride[0] or least > self.stride[1]:
             raise InvalidInput(
@@ -204,9 +204,9 @@ class GaitProblem:
 
     def feet(self, phase: ContactPhase) -> tuple[str, ...]:
         """The robot's legs that stand in a phase, in the order of `robot.legs`."""
-        left = [leg for leg in self.robot.legs if leg.endswith("L")]
-        standing = {left[PAIRS.index(pair)][:-1] for pair in phase.stands}
-        return tuple(leg for leg in self.robot.legs if leg[:-1] in standing)
+        pairs = mirror(self.robot).pairs
+        standing = [leg for pair in phase.stands for leg in pairs[PAIRS.index(pair)]]
+        return tuple(self.robot.legs[leg] for leg in sorted(standing))
 
     def before(self, index: int) -> ContactPhase:
         """The phase before the phase of an index; the last one comes before the first."""
@@ -231,7 +231,26 @@ class GaitProblem:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _check_sequence(sequence: tuple[ContactPhase, ...]) -> None:
+def _of_robot(robot: Robot, sequence: tuple[ContactPhase, ...]) -> tuple[ContactPhase, ...]:
+    """The sequence without pairs of legs that the robot has not: a biped's are the front ones."""
+    count = len(mirror(robot).pairs)
+    if count > len(PAIRS):
+        raise InvalidInput(
+            f"{robot.name} has {count} pairs of legs; gaits are made for {len(PAIRS)} at most"
+        )
+    kept = []
+    for phase in sequence:
+        stands = tuple(pair for pair in phase.stands if PAIRS.index(pair) < count)
+        if phase.stands and not stands:
+            raise InvalidInput(
+                f"{robot.name} has no {' and '.join(phase.stands)} legs, which {phase.name} needs; "
+                "choose a gait of the legs that it has, as 'pronk'"
+            )
+        kept.append(dataclasses.replace(phase, stands=stands))
+    return tuple(kept)
+
+
+def _check_sequence(sequence: tuple[ContactPhase, ...], pairs: int) -> None:
     names = [phase.name for phase in sequence]
     if len(set(names)) < len(names):
         raise InvalidInput(
@@ -241,7 +260,7 @@ def _check_sequence(sequence: tuple[ContactPhase, ...]) -> None:
         raise InvalidInput(
             "the sequence has no flight, so that no apex exists; add a phase of none"
         )
-    for pair in PAIRS:
+    for pair in PAIRS[:pairs]:
         if not any(pair in phase.stands for phase in sequence):
             raise InvalidInput(f"the {pair} legs never stand; add them to a phase")
     for before, phase in pairwise((sequence[-1], *sequence)):

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, cast, get_args
 
 import numpy as np
 
 from .._checks import known_name, sequence_of, shown, text
 from ..errors import InvalidInput
-from ..robot import Base, Robot
+from ..robot import (
+    Base,
+    Robot,
+    as_robot,
+    length_scale,
+    scaled_duration,
+    scaled_length,
+    torque_scale,
+)
 from .problem import BOUND, PITCHING_PRONK, PRONK, ContactPhase, GaitProblem
 
 
@@ -24,7 +32,7 @@ class Style:
         base: How the trunk may move, unless asked otherwise.
         pitching: The phases with a mesh for a trunk that pitches.
         speeds: Speeds of its library [m/s].
-        apex: Greatest height of the trunk in its library [m].
+        apex: Greatest height of the A1's trunk in its library [m]; of others see `apex_of`.
         stride: Shortest and longest stride [s].
     """
 
@@ -35,6 +43,10 @@ class Style:
     speeds: tuple[float, ...]
     apex: float
     stride: tuple[float, float]
+
+    def apex_of(self, robot: Robot) -> float:
+        """Greatest height of a robot's trunk in its library [m], scaled from the A1's."""
+        return scaled_length(robot, self.apex)
 
 
 def _speeds(first: float, last: float) -> tuple[float, ...]:
@@ -68,7 +80,7 @@ def load_style(name: str) -> Style:
 def gait_problem(
     robot: Robot, speed: float, *, gait: str = "pronk", base: Base | None = None, **changes: Any
 ) -> GaitProblem:
-    """A gait problem of a style.
+    """A gait problem of a style, with its heights and durations scaled from the A1 to the robot.
 
     Args:
         robot: The robot.
@@ -83,14 +95,44 @@ def gait_problem(
     """
     style = load_style(gait)
     base = style.base if base is None else known_base(base)
+    apex = style.apex_of(as_robot(robot))
+    sequence = style.pitching if base == "sagittal" else style.sequence
     defaults: dict[str, Any] = {
-        "apex": style.apex,
+        "apex": apex,
         "base": base,
-        "sequence": style.pitching if base == "sagittal" else style.sequence,
-        "stride": style.stride,
+        "sequence": tuple(
+            replace(phase, duration=_scaled(robot, phase.duration)) for phase in sequence
+        ),
+        "stride": _scaled(robot, style.stride),
+        **_of_size(robot),
     }
     _check_changes(changes)
-    return GaitProblem(robot, speed, **(defaults | changes))
+    problem = GaitProblem(robot, speed, **(defaults | changes))
+    stands = float(robot.standing[2])
+    if not problem.apex > stands:
+        raise InvalidInput(
+            f"apex {problem.apex:g} m: the {robot.name} stands at {stands:.3g} m already; give "
+            f"more, as {apex:g} m, or none for that"
+        )
+    return problem
+
+
+def _of_size(robot: Robot) -> dict[str, float]:
+    """Heights and weights of a problem, so that its cost means for a robot what it does for the A1.
+
+    Torques weigh against joint velocities as they do there: both by their size.
+    """
+    return {
+        "trunk_height": scaled_length(robot, GaitProblem.trunk_height),
+        "clearance": scaled_length(robot, GaitProblem.clearance),
+        "torque_weight": GaitProblem.torque_weight / torque_scale(robot) ** 2,
+        "velocity_weight": GaitProblem.velocity_weight * length_scale(robot),
+    }
+
+
+def _scaled(robot: Robot, durations: tuple[float, float]) -> tuple[float, float]:
+    shortest, longest = (scaled_duration(robot, each) for each in durations)
+    return shortest, longest
 
 
 def _check_changes(changes: Mapping[str, Any]) -> None:

@@ -22,14 +22,25 @@ from .feet import (
     leg_odometry,
     rotate_leg,
 )
-from .legs import LegGeometry, contact_points, leg_angles, leg_geometry, leg_motion
+from .legs import (
+    LegFrames,
+    LegGeometry,
+    contact_points,
+    leg_angles,
+    leg_frames,
+    leg_geometry,
+    leg_motion,
+)
+from .mirror import Mirror, mirror, mirrored
 from .whole_body import WholeBodySolution, inverse_kinematics
 
 __all__ = [
     "CONTACTS",
     "Contact",
+    "LegFrames",
     "LegGeometry",
     "LegSolution",
+    "Mirror",
     "WholeBodySolution",
     "bias_at",
     "contact_bias",
@@ -42,9 +53,12 @@ __all__ = [
     "jacobian_at",
     "leg_angle",
     "leg_angles",
+    "leg_frames",
     "leg_geometry",
     "leg_inverse_kinematics",
     "leg_motion",
     "leg_odometry",
+    "mirror",
+    "mirrored",
     "rotate_leg",
 ]

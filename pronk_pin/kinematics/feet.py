@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from .._checks import known_name
+from .._checks import known_name, none_or
 from .._typing import Array, BoolArray
 from ..errors import InvalidInput
 from ..robot import (
@@ -88,7 +88,7 @@ def leg_inverse_kinematics(
     positions: npt.ArrayLike,
     *,
     leg: str,
-    knee: Knee = "backward",
+    knee: Knee | None = None,
     hip: Hip = "above",
 ) -> LegSolution:
     """Joint angles that put the centre of one foot at given positions; closed form, batched.
@@ -97,7 +97,7 @@ def leg_inverse_kinematics(
         robot: The robot.
         positions: Foot centres from the trunk's origin, in the trunk's frame [m], shape (..., 3).
         leg: Name of the leg, as in `robot.legs`.
-        knee: Branch of the knee: "backward" or "forward".
+        knee: Branch of the knee: "backward" or "forward"; by default as the robot stands.
         hip: Branch of the hip: "above" the foot or "below" it.
 
     Raises:
@@ -105,7 +105,7 @@ def leg_inverse_kinematics(
         UnknownName: There is no such leg, knee or hip.
     """
     index = leg_indices(robot, [known_name("leg", leg, as_robot(robot).legs)])[0]
-    known_name("knee", knee, ("backward", "forward"))
+    none_or(known_name, "knee", knee, ("backward", "forward"))
     known_name("hip", hip, ("above", "below"))
     offsets = LegGeometry(*(part[index] for part in leg_geometry(robot)))
     positions = as_array("positions", positions, 3, None)
@@ -166,6 +166,9 @@ def leg_odometry(
 def leg_angle(robot: Robot, joints: npt.ArrayLike) -> Array:
     """Leg angles: theta = q_thigh + q_calf / 2, below eq. (11) of the paper; batched.
 
+    The joints' angles count about the trunk's y axis: where a URDF's joint turns against it, its
+    angle with the other sign.
+
     Args:
         robot: The robot, with legs of three joints.
         joints: Joint angles [rad], shape (..., 12).
@@ -177,7 +180,9 @@ def leg_angle(robot: Robot, joints: npt.ArrayLike) -> Array:
         InvalidInput: A wrong shape or NaN.
     """
     legs = as_array("joints", joints, as_robot(robot).nu, None)
-    return legs[..., 1 :: len(JOINTS)] + 0.5 * legs[..., 2 :: len(JOINTS)]
+    sense = leg_geometry(robot).sense
+    thigh, calf = (sense[:, k] * legs[..., k :: len(JOINTS)] for k in (1, 2))
+    return thigh + 0.5 * calf
 
 
 def rotate_leg(robot: Robot, joints: npt.ArrayLike, delta: npt.ArrayLike) -> Array:
@@ -202,7 +207,7 @@ def rotate_leg(robot: Robot, joints: npt.ArrayLike, delta: npt.ArrayLike) -> Arr
     if not np.isfinite(turn).all():
         raise InvalidInput("delta holds NaN or infinite values; remove them first")
     try:
-        thighs += turn
+        thighs += leg_geometry(robot).sense[:, 1] * turn
     except ValueError as error:
         raise InvalidInput(f"delta does not fit the legs, {thighs.shape}: {error}") from error
     return turned

@@ -2,9 +2,10 @@
 
 A leg turns about x at the hip and about y at the thigh and the calf; its foot is at
 
-    p = hip + Rx(q_hip) [thigh + Ry(q_thigh) (calf + Ry(q_calf) foot)]
+    p = hip + Rx(s q_hip) [thigh + Ry(s q_thigh) (calf + Ry(s q_calf) foot)]
 
-with the offsets of `LegGeometry`.
+with the offsets of `LegGeometry` and the senses s of its joints, 1 or -1. Which frames a URDF gives
+the joints does not matter: what counts is where their axes are when all angles are zero.
 """
 
 from __future__ import annotations
@@ -27,11 +28,15 @@ Hip = Literal["above", "below"]
 _ROUND_OFF = 1e-9
 """Relative round-off by which the reach of the links may be exceeded."""
 
-_AXES = {"hip": "RX", "thigh": "RY", "calf": "RY"}
+_AXES = {"hip": 0, "thigh": 1, "calf": 1}
+"""Axis of the trunk that a joint turns about, at zero joint angles."""
+
+_PARALLEL = 1e-9
+"""Deviation of an axis from the trunk's that is round-off: URDFs write pi with some digits."""
 
 
 class LegGeometry(NamedTuple):
-    """Offsets of the legs [m] in the trunk's axes at zero joint angles."""
+    """Offsets of legs [m] in the trunk's axes at zero joint angles, and their joints' senses."""
 
     hip: Array
     """From the trunk's origin to the hip joint, shape (legs, 3)."""
@@ -41,6 +46,23 @@ class LegGeometry(NamedTuple):
     """From the thigh joint to the calf joint, shape (legs, 3)."""
     foot: Array
     """From the calf joint to the centre of the foot, shape (legs, 3)."""
+    sense: Array
+    """1 where a joint turns about the trunk's axis, -1 where it turns against it, (legs, 3)."""
+    knee: Array
+    """Where the knees point when the robot stands: -1 backward, 1 forward, shape (legs,)."""
+
+
+class LegFrames(NamedTuple):
+    """Joints of a leg at zero joint angles, from the trunk down, in the trunk's axes."""
+
+    offset: Array
+    """From the joint above, the trunk's origin for the first, to each joint [m], shape (3, 3)."""
+    rotation: Array
+    """Orientation of each joint's frame in the trunk, shape (3, 3, 3)."""
+    axis: Array
+    """Axes that the joints turn about, shape (3, 3)."""
+    foot: Array
+    """From the last joint to the centre of the foot [m], shape (3,)."""
 
 
 class LegMotion(NamedTuple):
@@ -54,35 +76,51 @@ class LegMotion(NamedTuple):
     """Angular velocity of the calves relative to the trunk [rad/s], shape (..., legs, 3)."""
 
 
+@lru_cache(maxsize=64)
+def leg_frames(robot: Robot, leg: str) -> LegFrames:
+    """The joints of a leg at zero joint angles, whatever frames the URDF gives them."""
+    model, above = robot.model, np.eye(3)
+    offsets, rotations, axes = [], [], []
+    for name in robot.spec.leg_joints(leg):
+        joint = model.getJointId(name)
+        placement = model.jointPlacements[joint]
+        offsets.append(above @ placement.translation)
+        above = above @ placement.rotation
+        rotations.append(above)
+        axes.append(above @ np.array(model.joints[joint].createData().S).ravel()[3:])
+    foot = model.frames[robot.foot_ids[robot.legs.index(leg)]].placement.translation
+    return LegFrames(np.array(offsets), np.array(rotations), np.array(axes), above @ foot)
+
+
 @lru_cache(maxsize=16)
 def leg_geometry(robot: Robot) -> LegGeometry:
-    """Offsets of the legs, read from the model's joint placements.
+    """Offsets of the legs and senses of their joints, read from the model's joint placements.
 
     Raises:
-        InvalidInput: The legs have not three joints about x, y, y in parallel frames, or there are
-            joints besides: the closed form does not hold.
+        InvalidInput: The legs have not three joints about x, y, y of the trunk, or there are joints
+            besides: the closed form does not hold.
     """
-    model = robot.model
     if len(robot.spec.joints) != len(JOINTS) or robot.joint_names != robot.spec.joint_names:
         raise InvalidInput(
             f"{robot.name}: closed-form leg kinematics needs legs of three joints and no others, "
             f"not {', '.join(robot.joint_names)}"
         )
-    offsets: dict[str, list[Array]] = {part: [] for part in (*JOINTS, "foot")}
-    for leg, foot_id in zip(robot.legs, robot.foot_ids, strict=True):
-        for joint, name in zip(JOINTS, robot.spec.leg_joints(leg), strict=True):
-            joint_id = model.getJointId(name)
-            placement = model.jointPlacements[joint_id]
-            kind = model.joints[joint_id].shortname().removeprefix("JointModel")
-            if kind != _AXES[joint] or not np.allclose(placement.rotation, np.eye(3), atol=1e-9):
+    legs = [leg_frames(robot, leg) for leg in robot.legs]
+    sense = np.empty((len(legs), len(JOINTS)))
+    for row, leg, frames in zip(sense, robot.legs, legs, strict=True):
+        for k, (joint, name) in enumerate(zip(JOINTS, robot.spec.leg_joints(leg), strict=True)):
+            row[k] = np.sign(frames.axis[k, _AXES[joint]])
+            if not np.allclose(frames.axis[k], row[k] * np.eye(3)[_AXES[joint]], atol=_PARALLEL):
                 raise InvalidInput(
-                    f"{robot.name}: joint {name} is not a {_AXES[joint]} joint parallel to the "
-                    "trunk; closed-form leg kinematics needs hips about x, thighs and calves "
-                    "about y"
+                    f"{robot.name}: joint {name} does not turn about the trunk's "
+                    f"{'xyz'[_AXES[joint]]} axis when all angles are zero; closed-form leg "
+                    "kinematics needs hips about x, thighs and calves about y"
                 )
-            offsets[joint].append(np.array(placement.translation))
-        offsets["foot"].append(np.array(model.frames[foot_id].placement.translation))
-    return LegGeometry(*(np.stack(offsets[part]) for part in (*JOINTS, "foot")))
+    offset, foot = np.stack([leg.offset for leg in legs]), np.stack([leg.foot for leg in legs])
+    calf = sense[:, 2] * robot.standing[7:].reshape(sense.shape)[:, 2]
+    straight = _pitch(foot[:, 0], foot[:, 2]) - _pitch(offset[:, 2, 0], offset[:, 2, 2])
+    knee = np.where(calf + straight > 0.0, 1.0, -1.0)
+    return LegGeometry(offset[:, 0], offset[:, 1], offset[:, 2], foot, sense, knee)
 
 
 def leg_motion(geometry: LegGeometry, joints: Array, rates: Array) -> LegMotion:
@@ -93,8 +131,8 @@ def leg_motion(geometry: LegGeometry, joints: Array, rates: Array) -> LegMotion:
         joints: Joint angles [rad], shape (..., legs, 3).
         rates: Joint velocities [rad/s], shape (..., legs, 3).
     """
-    hip, thigh, calf = np.moveaxis(joints, -1, 0).copy()  # (..., legs)
-    hip_rate, thigh_rate, bend_rate = np.moveaxis(rates, -1, 0).copy()
+    hip, thigh, calf = np.moveaxis(geometry.sense * joints, -1, 0).copy()  # (..., legs)
+    hip_rate, thigh_rate, bend_rate = np.moveaxis(geometry.sense * rates, -1, 0).copy()
     calf_rate = thigh_rate + bend_rate  # about y, of the calf against the hip link
     upper_z, upper_x = _turned(thigh, geometry.calf[..., 2], geometry.calf[..., 0])
     lower_z, lower_x = _turned(thigh + calf, geometry.foot[..., 2], geometry.foot[..., 0])
@@ -141,7 +179,7 @@ def contact_points(geometry: LegGeometry, joints: Array, down: Array) -> Contact
 
 
 def leg_angles(
-    geometry: LegGeometry, positions: Array, *, knee: Knee = "backward", hip: Hip = "above"
+    geometry: LegGeometry, positions: Array, *, knee: Knee | None = None, hip: Hip = "above"
 ) -> tuple[Array, BoolArray]:
     """Closed-form joint angles for positions of the feet's centres, and whether they are in reach.
 
@@ -149,7 +187,7 @@ def leg_angles(
         geometry: Offsets of the legs, or of one leg.
         positions: Foot centres from the trunk's origin, in the trunk's frame [m], shape
             (..., legs, 3), or (..., 3) for one leg.
-        knee: Branch of the knee.
+        knee: Branch of the knee; None for that of the standing posture.
         hip: Branch of the hip: above the foot or below it.
 
     Returns:
@@ -163,19 +201,21 @@ def leg_angles(
     height = np.sqrt(np.maximum(square, 0.0)) * (-1.0 if hip == "above" else 1.0)
     hip_angle = np.arctan2(target[..., 2], target[..., 1]) - np.arctan2(height, side)
     x, z = target[..., 0] - geometry.thigh[..., 0], height - geometry.thigh[..., 2]
-    thigh_angle, calf_angle, in_plane = _two_links(geometry, x, z, knee)
+    side_of_knee = geometry.knee if knee is None else -1.0 if knee == "backward" else 1.0
+    thigh_angle, calf_angle, in_plane = _two_links(geometry, x, z, side_of_knee)
     reachable = np.asarray(in_plane & (square >= -_ROUND_OFF))
-    return np.stack([hip_angle, thigh_angle, calf_angle], axis=-1), reachable
+    angles = np.stack([hip_angle, thigh_angle, calf_angle], axis=-1)
+    return geometry.sense * angles, reachable
 
 
 def _two_links(
-    offsets: LegGeometry, x: Array, z: Array, knee: Knee
+    offsets: LegGeometry, x: Array, z: Array, knee: Array | float
 ) -> tuple[Array, Array, BoolArray]:
     """Thigh and calf angle that put the foot at (x, z) from the thigh joint; whether in reach."""
     calf, foot = offsets.calf, offsets.foot
     upper, lower = np.hypot(calf[..., 0], calf[..., 2]), np.hypot(foot[..., 0], foot[..., 2])
     cosine = (x**2 + z**2 - upper**2 - lower**2) / (2.0 * upper * lower)
-    bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * (-1.0 if knee == "backward" else 1.0)
+    bend = np.arccos(np.clip(cosine, -1.0, 1.0)) * knee
     calf_angle = bend + _pitch(calf[..., 0], calf[..., 2]) - _pitch(foot[..., 0], foot[..., 2])
     # From the thigh joint to the foot at zero thigh angle.
     leg_z, leg_x = _turned(calf_angle, foot[..., 2], foot[..., 0])

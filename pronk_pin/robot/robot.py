@@ -40,7 +40,6 @@ from .urdf_file import read_urdf
 __all__ = [
     "JOINTS",
     "NB",
-    "NL",
     "ROBOTS",
     "Robot",
     "RobotSpec",
@@ -50,8 +49,8 @@ __all__ = [
     "with_rotors",
 ]
 
-NB, NL = 6, 12
-"""Velocities of the floating base, and actuated joints of a robot with four legs of three."""
+NB = 6
+"""Velocities of the floating base."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +161,19 @@ class Robot:
     @cached_property
     def v_max(self) -> Array:
         """Joint velocity limits [rad/s], shape (12,)."""
-        return np.array(self.model.velocityLimit[-self.nu :])
+        return self._limits(self.spec.velocity_limits, self.model.velocityLimit)
 
     @cached_property
     def tau_max(self) -> Array:
         """Torque limits [N m], shape (12,)."""
-        return np.array(self.model.effortLimit[-self.nu :])
+        return self._limits(self.spec.torque_limits, self.model.effortLimit)
+
+    def _limits(self, given: tuple[float, ...], of_urdf: Array) -> Array:
+        """Limits of the joints: those that the specification gives for a leg, or the URDF's."""
+        limits = np.array(of_urdf[-self.nu :])
+        if given:
+            limits = np.where(self.joint_kinds < 0, limits, np.array(given)[self.joint_kinds])
+        return limits
 
     @cached_property
     def mass(self) -> float:

@@ -19,12 +19,16 @@ from ..storage import as_type, check_file, read_toml
 JOINTS = ("hip", "thigh", "calf")
 """Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
 
-ROTOR = 0.000111842 * 9.0**2
-"""Rotor inertia of Unitree's motor as the joint feels it, through the gear [kg m^2]: about its own
-axis that of the links *_rotor of go1.urdf in example-robot-data (the A1 has the same motor, and its
-URDF leaves the rotors out); gear ratio: the paper, section II.A."""
-
-_ROTOR = Interval(0, 10, "kg m^2")
+_OF_A_LEG = {
+    "rotors": Interval(0, 10, "kg m^2"),
+    "torque_limits": Interval(0, 1e5, "N m", above=True),
+    "velocity_limits": Interval(0, 1e5, "rad/s", above=True),
+    "damping": Interval(0, 50, "N m s/rad"),
+    "coulomb": Interval(0, 50, "N m"),
+    "kp": Interval(0, 1e5, "N m/rad"),
+    "kd": Interval(0, 1e4, "N m s/rad"),
+}
+"""Fields with one value for each joint of a leg, and what the values can be."""
 
 _DATA_DISTRIBUTION = "example-robot-data"
 
@@ -49,6 +53,16 @@ class RobotSpec:
         rotors: Rotor inertia of a leg's joints as they feel it, through the gear [kg m^2], from the
             motors' datasheet; one for each of `joints`, or none where it is not known. The URDF's
             model is without it; controllers that know it say so.
+        torque_limits: Largest torques of a leg's motors [N m], where the URDF's are not theirs;
+            none for the URDF's.
+        velocity_limits: Largest velocities of a leg's joints [rad/s], likewise.
+        damping: Viscous friction that a leg's motors add to its joints [N m s/rad], in the nominal
+            scenario; none for the A1's, scaled, see `robot.similarity`.
+        coulomb: Coulomb friction that they add [N m], likewise.
+        kp: Feedback gains of a leg's joints [N m/rad]; none for the A1's, scaled by weight and leg
+            length, see `robot.similarity`.
+        kd: Their derivative gains [N m s/rad], likewise.
+        apex: Apex of its gaits [m]; None for the A1's, scaled by the standing height.
     """
 
     name: str
@@ -61,6 +75,13 @@ class RobotSpec:
     standing: tuple[float, ...] = (0.0, 0.9, -1.8)
     foot_radius: float | None = None
     rotors: tuple[float, ...] = ()
+    torque_limits: tuple[float, ...] = ()
+    velocity_limits: tuple[float, ...] = ()
+    damping: tuple[float, ...] = ()
+    coulomb: tuple[float, ...] = ()
+    kp: tuple[float, ...] = ()
+    kd: tuple[float, ...] = ()
+    apex: float | None = None
 
     def __post_init__(self) -> None:
         file_name("name", self.name)
@@ -79,12 +100,16 @@ class RobotSpec:
         radius = none_or(real, "foot_radius", self.foot_radius, Interval(0, unit="m"))
         object.__setattr__(self, "foot_radius", radius)
 
-        object.__setattr__(self, "rotors", reals("rotors", self.rotors, _ROTOR))
-        if len(self.rotors) not in (0, len(self.joints)):
-            raise InvalidInput(
-                f"rotors has {len(self.rotors)} inertias; give {len(self.joints)}, one for each "
-                "joint of a leg, or none"
-            )
+        apex = none_or(real, "apex", self.apex, Interval(0, 100, "m", above=True))
+        object.__setattr__(self, "apex", apex)
+        for name, within in _OF_A_LEG.items():
+            values = reals(name, getattr(self, name), within)
+            object.__setattr__(self, name, values)
+            if len(values) not in (0, len(self.joints)):
+                raise InvalidInput(
+                    f"{name} has {len(values)} values; give {len(self.joints)}, one for each joint "
+                    "of a leg, or none"
+                )
 
     @classmethod
     def load(cls, path: Path | str) -> RobotSpec:
@@ -131,34 +156,9 @@ class RobotSpec:
 
 
 ROBOTS = {
-    spec.name: spec
-    for spec in (
-        RobotSpec("a1", "a1_description/urdf/a1.urdf", rotors=(ROTOR,) * 3),
-        RobotSpec("go1", "go1_description/urdf/go1.urdf", rotors=(ROTOR,) * 3),
-        RobotSpec(
-            "go2",
-            "go2_description/urdf/go2.urdf",
-            base_link="base",
-            # The feet are meshes; half their extent fore and aft, 45.3 mm, of foot_convex.stl.
-            foot_radius=0.0227,
-            rotors=(ROTOR,) * 3,  # taken for the A1's
-        ),
-        RobotSpec(
-            "solo12",
-            "solo_description/robots/solo12.urdf",
-            base_link="base_link",
-            legs=("FL", "FR", "HL", "HR"),
-            joints=("HAA", "HFE", "KFE"),
-            joint_pattern="{leg}_{joint}",
-            foot_pattern="{leg}_FOOT",
-            # "straight_standing" of solo.srdf: knees point towards each other.
-            standing=(0.0, 0.8, -1.6) * 2 + (0.0, -0.8, 1.6) * 2,
-            # The feet are meshes: discs of 32 mm, of solo_foot.stl.
-            foot_radius=0.016,
-        ),
-    )
+    path.stem: RobotSpec.load(path) for path in sorted(Path(__file__).with_name("specs").iterdir())
 }
-"""Robots known by name."""
+"""Robots known by name; their files are examples for one of your own."""
 
 
 def load_robot_spec(robot: str | RobotSpec) -> RobotSpec:

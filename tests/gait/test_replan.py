@@ -5,7 +5,7 @@ import pytest
 
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import load_library, replan
-from pronk_pin.robot import ROTOR, load_robot, with_rotors
+from pronk_pin.robot import load_robot, with_rotors
 
 
 def test_gaits_are_planned_with_the_rotors_and_without_they_are_the_shipped_ones() -> None:
@@ -22,6 +22,6 @@ def test_gaits_are_planned_with_the_rotors_and_without_they_are_the_shipped_ones
 
 
 def test_the_rotors_are_those_of_the_datasheet() -> None:
-    assert with_rotors(load_robot("a1")).parameters.armature == (ROTOR,) * 3
+    assert with_rotors(load_robot("a1")).parameters.armature == (0.000111842 * 9.0**2,) * 3
     with pytest.raises(InvalidInput, match="rotors of solo12 are not known"):
         with_rotors(load_robot("solo12"))

@@ -97,10 +97,10 @@ def test_mujoco_falls_with_the_same_acceleration(
 
 
 def test_the_paper_counts_from_the_front_right(any_robot: Robot) -> None:
-    joints = np.arange(12.0)
-    np.testing.assert_array_equal(
-        to_paper(any_robot, joints), [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
-    )
+    joints, legs = np.arange(12.0), any_robot.legs
+    there = ("RF", "LF", "RH", "LH") if legs[0].upper() == "LF" else [*legs[1::-1], *legs[:1:-1]]
+    expected = [3 * [leg.upper() for leg in legs].index(leg) + k for leg in there for k in range(3)]
+    np.testing.assert_array_equal(to_paper(any_robot, joints), expected)
     np.testing.assert_array_equal(from_paper(any_robot, to_paper(any_robot, joints)), joints)
 
 

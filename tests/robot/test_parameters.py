@@ -92,7 +92,8 @@ def test_flight_agrees_with_mujoco_with_rotors_friction_motors_and_load(identifi
         )
         v = rng.standard_normal(identified.nv)
         v[6:] = np.where(v[6:] < 0.0, -1.0, 1.0) * (2.0 + np.abs(v[6:]))
-        tau = 3.0 * rng.standard_normal(identified.nu)
+        limit = identified.tau_max
+        tau = np.clip(3.0 * rng.standard_normal(identified.nu), -limit, limit)
         state = to_mujoco(identified, q, v)
         data.qpos[:], data.qvel[:] = state.qpos, state.qvel
         data.ctrl[joints] = tau

@@ -13,7 +13,6 @@ import numpy as np
 from ..._typing import Array, BoolArray, IntArray
 from ...control import Reference
 from ...gait import Gait
-from ...robot import NL
 
 _BEFORE = 40
 """Ticks before a touchdown as the controller has it in which the true contact is looked for."""
@@ -33,7 +32,7 @@ class ContactErrors:
     def __init__(self, gaits: Sequence[Gait], timestep: float) -> None:
         stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
         self._position, self._ticks = stance.position, stance.ticks
-        self._joints = np.full((len(gaits), _BEFORE, NL), np.nan)
+        self._joints = np.full((len(gaits), _BEFORE, self._position.shape[-1]), np.nan)
         self._loaded = np.zeros((len(gaits), _BEFORE), dtype=bool)
 
     def flight(self, rows: IntArray, joints: Array, force: Array, length: IntArray) -> None:

@@ -20,10 +20,10 @@ from ...control import (
     roll_pitch_yaw,
 )
 from ...gait import Gait
-from ...robot import NL, rotation_matrix
+from ...robot import Robot, rotation_matrix
 from ..world import Motion
 from .contact_errors import ContactErrors
-from .quantities import EVERY, LAST, SAMPLES, STRIDE_QUANTITIES, TICK_QUANTITIES
+from .quantities import EVERY, LAST, SAMPLES, STRIDE_QUANTITIES, TICK_QUANTITIES, sizes_of
 
 SHORTEST_STRIDE = 0.5
 """Strides shorter than this share of the planned duration do not occur: it sizes the log."""
@@ -49,13 +49,16 @@ class TickLog:
         inertial: Whether an IMU is read at each tick; else `specific_force` is of no use.
     """
 
-    def __init__(self, n: int, size: int, *, turns: bool = True, inertial: bool = False) -> None:
+    def __init__(
+        self, n: int, size: int, robot: Robot, *, turns: bool = True, inertial: bool = False
+    ) -> None:
+        joints, feet = robot.nu, len(robot.legs)
         self.size, self.turns, self.inertial = size, turns, inertial
         self.specific_force = np.zeros((n, size, 3))
-        self.joints, self.joint_rates = np.zeros((2, n, size, NL))
-        self.feedback, self.feedforward, self.missing, self.balance = np.zeros((4, n, size, NL))
+        self.joints, self.joint_rates = np.zeros((2, n, size, joints))
+        self.feedback, self.feedforward, self.missing, self.balance = np.zeros((4, n, size, joints))
         self.base, self.base_rate = np.zeros((2, n, size, 2))
-        self.force = np.zeros((n, size, NL // 3, 3))
+        self.force = np.zeros((n, size, feet, 3))
         self.pose, self.twist = np.zeros((n, size, 7)), np.zeros((n, size, 6))
         self.pose[..., 6] = 1.0  # level, until something else is written
         self._torques = [self.feedback, self.feedforward, self.missing]
@@ -177,7 +180,7 @@ class StrideLog:
         self._close = np.zeros(n, dtype=bool)
         self._strides = int(np.ceil(duration / (SHORTEST_STRIDE * whole.min()))) + 1
         ticks = int(np.ceil(LONGEST_PART * self._planned.max() / timestep))
-        sizes = {"speed": n, "stride": self._strides, "tick": ticks}
+        sizes = {"speed": n, "stride": self._strides, "tick": ticks, **sizes_of(gaits[0])}
         self._arrays = {each.name: each.empty(sizes) for each in STRIDE_QUANTITIES}
         self._ticks = {each.name: each.empty(sizes) for each in TICK_QUANTITIES}
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from ...errors import InvalidInput
 from ...gait import Gait
 from .log import SHORTEST_STRIDE
-from .quantities import STRIDE_QUANTITIES
+from .quantities import STRIDE_QUANTITIES, sizes_of
 
 _COPIES = 3
 """A finished log, the dataset that is made of it, and its file are in memory together."""
@@ -21,7 +21,7 @@ def log_size(gaits: Sequence[Gait], duration: float) -> float:
     """Memory that the strides of robots take with these gaits, over a duration [s], in bytes."""
     shortest = min(gait.duration for gait in gaits)
     strides = duration / (SHORTEST_STRIDE * shortest) + 1.0
-    one = {"speed": 1, "stride": 1}
+    one = {"speed": 1, "stride": 1, **sizes_of(gaits[0])}
     stride = sum(math.prod(each.shape(one)) * each.dtype.itemsize for each in STRIDE_QUANTITIES)
     return len(gaits) * strides * stride
 

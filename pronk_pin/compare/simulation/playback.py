@@ -178,7 +178,7 @@ class FeedbackPlayback(Playback):
         ticks: int,
     ) -> None:
         self._world, self._motors, self._sensors = world, motors, sensors
-        self._gains, self._balance, self._tick_loop = spec.gains, balance, tick_loop
+        self._gains, self._balance, self._tick_loop = spec.gains_of(world.robot), balance, tick_loop
         self._load = np.zeros(world.force.shape[:2])  # as measured in the tick before
         self._inertial = None  # without one the trunk's true state is known
         if balance is not None and spec.imu:
@@ -192,7 +192,7 @@ class FeedbackPlayback(Playback):
                 gravity=float(np.linalg.norm(scenario.gravity_vector)),
             )
         turns, inertial = balance is not None, self._inertial is not None
-        self.sensed = TickLog(world.n, ticks, turns=turns, inertial=inertial)
+        self.sensed = TickLog(world.n, ticks, world.robot, turns=turns, inertial=inertial)
 
     def next_stop(self, rows: IntArray, tick: int, part: int | None) -> int:
         """See `Playback`."""

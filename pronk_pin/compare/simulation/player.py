@@ -74,7 +74,8 @@ class Player:
         n, level = len(gaits), balance is None
         known = chunked and level and scenario.foreseeable  # torques, before they act
         known &= tick_loop is None
-        servo = spec.gains if known and scenario.affine else None
+        gains = spec.gains_of(robot)
+        servo = gains if known and scenario.affine else None
         self.world = World(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
         dt = scenario.timestep
@@ -82,16 +83,17 @@ class Player:
             scenario.sensors,
             n,
             rng,
+            joints=robot.nu,
             latency=round(scenario.touchdown_latency / dt),
             jitter=round(scenario.touchdown_jitter / dt),
         )
-        self.log = TickLog(n, ticks, turns=not level)
+        self.log = TickLog(n, ticks, robot, turns=not level)
         flight = np.array([gait.flight.duration for gait in gaits])
         self._playback: Playback
         if servo is not None:
             self._playback = ServoPlayback(self.world, servo, self.log, flight)
         elif known and scenario.delay_ticks:
-            self._playback = DelayedPlayback(self.world, self.motors, spec.gains, self.log)
+            self._playback = DelayedPlayback(self.world, self.motors, gains, self.log)
         else:
             self._playback = FeedbackPlayback(
                 self.world,
@@ -103,7 +105,7 @@ class Player:
                 ticks=ticks,
             )
         self.sensed = self._playback.sensed
-        self._gains, self._balance, self._tick_loop = spec.gains, balance, tick_loop
+        self._gains, self._balance, self._tick_loop = gains, balance, tick_loop
         self._level_imu = spec.imu and level  # read a phase at a time
         self.late = np.full(n, spec.touchdown_ticks, dtype=np.intp)
         self._touchdown = TouchdownDetector(

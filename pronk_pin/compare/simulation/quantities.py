@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from ... import control
 from ...control import PARTS
-from ...robot import NL
+from ...gait import Gait
 
 EVERY = 4
 SAMPLES = (control.SAMPLES - 1) // EVERY + 1
@@ -37,8 +37,6 @@ _SIZES = {
     **{dimension: len(labels) for dimension, labels in LABELS.items()},
     "phase": SAMPLES,
     "last": LAST,
-    "joint": NL,
-    "foot": NL // 3,
 }
 
 
@@ -69,13 +67,19 @@ class Quantity:
 
         Args:
             sizes: Sizes of the dimensions that are not the same in all simulations: `speed`,
-                `stride` and `tick`.
+                `stride` and `tick`, and those of `sizes_of`.
         """
         return tuple({**_SIZES, **sizes}[dimension] for dimension in self.dimensions)
 
     def empty(self, sizes: Mapping[str, int]) -> npt.NDArray[np.floating[Any]]:
         """An array for it, full of NaN; `sizes` as in `shape`."""
         return np.full(self.shape(sizes), np.nan, self.dtype)
+
+
+def sizes_of(gait: Gait) -> dict[str, int]:
+    """Sizes of the dimensions that depend on the robot, read from one of its gaits."""
+    joints = gait.stance.joints.shape[0]
+    return {"joint": joints, "foot": gait.stance.lam.shape[0]}
 
 
 _STRIDE = ("speed", "stride")

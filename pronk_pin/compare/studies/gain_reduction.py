@@ -58,8 +58,9 @@ def sweep_gains(
     rows = []
     for share in shares:
         for initial in (None, learned):
-            gains = Gains(_scaled(spec.gains.kp, share), _scaled(spec.gains.kd, share))
-            replay = replace(spec, law=None, flight_law=None, gains=gains)
+            full = spec.gains_of(machine)
+            gains = Gains(_scaled(full.kp, share), _scaled(full.kd, share))
+            replay = replace(spec, law=None, flight_law=None, gains=gains, stiffness=1.0)
             if initial is None:
                 replay = replace(replay, timing=None)  # learning finds that out, too
             replayed = simulate(

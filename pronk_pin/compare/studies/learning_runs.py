@@ -11,7 +11,7 @@ from ..._checks import reals
 from ...control import ControllerSpec, LearningLaw
 from ...errors import InvalidInput
 from ...gait import Gait
-from ...robot import JOINTS, NL, Robot
+from ...robot import JOINTS, Robot
 from ..metrics import STEADY_STRIDES
 from ..simulation import Schedule, simulate
 from ..world import Scenario
@@ -72,7 +72,7 @@ def mean_peaks(strides: xr.Dataset, robot: int | None = None) -> dict[str, float
         for k, count in enumerate(counts)
         if robot in (None, k) and upright[k] and count
     ]
-    legs = np.mean(steady, axis=0) if steady else np.full(NL, np.nan)
+    legs = np.mean(steady, axis=0) if steady else np.full(strides.sizes["joint"], np.nan)
     means = legs.reshape(-1, len(JOINTS)).mean(axis=0)
     return {
         **{joint: float(mean) for joint, mean in zip(JOINTS, means, strict=True)},

@@ -161,7 +161,9 @@ def compare_prediction(
     """
     law = learning_law(spec)
     robot, gait = recorded_robot(strides.attrs), load_library(strides.attrs["robot"]).at(speed)
-    settings = StrideSettings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
+    settings = StrideSettings(
+        spec.gains_of(robot), spec.regulator, spec.speed_filter, spec.touchdown_ticks
+    )
     rotors = Rotors(scenario.armature, scenario.damping)
     model = lifted_model(robot, gait, settings, rotors=rotors)
     if isinstance(law, ModelBasedILC):
@@ -178,7 +180,7 @@ def compare_prediction(
     return Prediction(
         spec.name,
         speed,
-        analyze(law, model, begin),
+        analyze(law, model, begin, robot=robot),
         predicted=_by_joint(predict(law, model, begin, len(error) - 1)[:, kept]),
         rehearsed=_by_joint(rehearse(planar, law, begin, len(error) - 1)[:, kept]),
         measured=_by_joint(error),
@@ -260,8 +262,9 @@ def _record(stride: xr.Dataset, model: LiftedModel) -> StrideRecord:
         name: stride[name].transpose("phase", "joint").interp(phase=phase_grid()).to_numpy()[None]
         for name in ("error", "feedback", "feedforward")
     }
-    gains = model.gains
-    rate = (curves["feedback"] - gains.proportional * curves["error"]) / gains.derivative
+    gains, joints = model.gains, model.shape[1]
+    damped = curves["feedback"] - gains.proportional(joints) * curves["error"]
+    rate = damped / gains.derivative(joints)
     return StrideRecord.of(
         curves["error"].astype(float),
         rate.astype(float),

@@ -31,7 +31,7 @@ from ..._typing import Array, IntArray
 from ...control import PARTS, SAMPLES, ControllerSpec, Memory, phase_grid
 from ...errors import InvalidInput
 from ...gait import load_library
-from ...robot import NL, load_robot
+from ...robot import load_robot
 from ..simulation import Schedule, Simulation
 from ..world import Scenario
 
@@ -115,15 +115,15 @@ def describe_stability(table: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def _modes() -> Array:
+def _modes(joints: int) -> Array:
     """Changes of a feedforward by one, in all legs, shape (modes, 2, samples, 12)."""
     centres = np.linspace(0.0, 1.0, _HATS)
     hats = np.maximum(0.0, 1.0 - np.abs(phase_grid()[:, None] - centres) * (_HATS - 1))
-    modes = np.zeros((len(PARTS), 2, _HATS, len(PARTS), SAMPLES, NL))
+    modes = np.zeros((len(PARTS), 2, _HATS, len(PARTS), SAMPLES, joints))
     for part in range(len(PARTS)):
         for joint in (1, 2):  # thigh and calf
             modes[part, joint - 1, :, part, :, joint::3] = hats.T[..., None]
-    return modes.reshape(-1, len(PARTS), SAMPLES, NL)
+    return modes.reshape(-1, len(PARTS), SAMPLES, joints)
 
 
 class _Study:
@@ -143,7 +143,7 @@ class _Study:
         learning = self._simulation(1, replace(spec, coupling=_STABLE), schedule)
         learning.run()
         self._learned = learning.controller.memory
-        self._modes = _modes()
+        self._modes = _modes(self._robot.nu)
 
     def _simulation(
         self, n: int, spec: ControllerSpec, schedule: Schedule, memory: Memory | None = None

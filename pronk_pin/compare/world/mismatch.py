@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ...robot import ROTOR
+from ...robot import ROBOTS
 from .sensors import Sensors
 
 NOISE = Sensors(
@@ -67,7 +67,9 @@ KNOWN = {
         "trunk's centre of mass forward", 0.03, "m", lambda x: {"com_shift": (x, 0.0, 0.0)}
     ),
     "weak-motors": Mismatch("torque given over asked for", 0.85, "1", _of("torque_constant")),
-    "armature": Mismatch("rotor inertia at the joint", 2 * ROTOR, "kg m^2", _of("armature")),
+    "armature": Mismatch(
+        "rotor inertia at the joint", 2 * ROBOTS["a1"].rotors[0], "kg m^2", _of("armature")
+    ),
     "damping": Mismatch("viscous friction", 0.5, "N m s/rad", _of("damping")),
     "coulomb": Mismatch("Coulomb friction", 0.6, "N m", _of("coulomb")),
     "soft-ground": Mismatch("time constant of contact", 0.01, "s", _of("ground_time_constant")),

@@ -40,7 +40,7 @@ from ..._registry import (
     source_sha256,
 )
 from ...errors import InvalidInput, UnknownName
-from ...robot import ROTOR
+from ...robot import ROBOTS
 from ...storage import from_text
 from .mismatch import KNOWN, NOISE
 from .sensors import Sensors
@@ -274,11 +274,13 @@ class Scenario:
         return (-self.gravity * math.sin(self.slope), 0.0, -self.gravity * math.cos(self.slope))
 
 
+_A1 = ROBOTS["a1"]
+
 BASE_SCENARIOS = {
     scenario.name: scenario
     for scenario in (
         Scenario("ideal"),
-        Scenario("nominal", armature=ROTOR, damping=0.1, coulomb=0.2),
+        Scenario("nominal", armature=_A1.rotors[0], damping=_A1.damping[0], coulomb=_A1.coulomb[0]),
     )
 }
 """Worlds to begin with: what the robot's own description says, and with what URDFs leave out."""
@@ -399,7 +401,7 @@ def _sample(seed: int, index: int) -> Scenario:
 
     return Scenario(
         f"random-{seed}-{index}",
-        armature=draw(0.6, 1.8) * ROTOR,
+        armature=draw(0.6, 1.8) * _A1.rotors[0],
         damping=draw(0.02, 0.4),
         coulomb=draw(0.05, 0.5),
         torque_constant=draw(0.85, 1.05),

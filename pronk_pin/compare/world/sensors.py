@@ -8,7 +8,6 @@ import numpy as np
 
 from ..._checks import NOT_NEGATIVE, Interval, instance_of, keep_reals, real, whole
 from ..._typing import Array, IntArray
-from ...robot import NL
 
 _LIMITS = {
     "encoder_noise": Interval(0, 1, "rad"),
@@ -76,6 +75,7 @@ class SensorSuite:
         sensors: How far they are from the truth.
         n: Number of robots.
         rng: Source of the streams, which are spawned from it.
+        joints: Number of joints of each.
         latency: Ticks by which touchdowns are sensed late.
         jitter: Greatest number of ticks that come on top, drawn for each touchdown.
     """
@@ -86,6 +86,7 @@ class SensorSuite:
         n: int,
         rng: np.random.Generator,
         *,
+        joints: int = 12,
         latency: int = 0,
         jitter: int = 0,
     ) -> None:
@@ -96,10 +97,10 @@ class SensorSuite:
         self._jitter = whole("jitter", jitter, _LATENESS)
         self._streams = rng.spawn(n)
         self._touchdown_streams = rng.spawn(n)  # the same, however many ticks are played at once
-        biases = np.stack([stream.standard_normal(NL + 6) for stream in self._streams])
-        self._encoder_bias = sensors.encoder_bias * biases[:, :NL]
+        biases = np.stack([stream.standard_normal(joints + 6) for stream in self._streams])
+        self._encoder_bias = sensors.encoder_bias * biases[:, :joints]
         scale = np.repeat([sensors.gyro_bias, sensors.accelerometer_bias], 3)
-        self._imu_bias = scale * biases[:, NL:]
+        self._imu_bias = scale * biases[:, joints:]
 
     def encoders(self, rows: IntArray, joints: Array, rates: Array) -> tuple[Array, Array]:
         """Measure joint angles [rad] and velocities [rad/s] of some robots at one tick.
@@ -109,7 +110,7 @@ class SensorSuite:
             joints: True joint angles [rad], shape (m, 12).
             rates: True joint velocities [rad/s], shape (m, 12).
         """
-        angle, rate = self._noise(rows, (2, NL)).swapaxes(0, 1)
+        angle, rate = self._noise(rows, (2, joints.shape[1])).swapaxes(0, 1)
         angle = self.sensors.encoder_noise * angle + self._encoder_bias[rows]
         return joints + angle, rates + self.sensors.rate_noise * rate
 

@@ -92,6 +92,8 @@ def _edited(spec: mujoco.MjSpec, scenario: Scenario) -> mujoco.MjModel:
 def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario, servo: Gains | None) -> None:
     """A motor at every joint; rotor and friction come on top of the joint's own."""
     constant = scenario.torque_constant
+    if servo is not None:
+        proportional, derivative = servo.proportional(robot.nu), servo.derivative(robot.nu)
     for index, name in enumerate(robot.joint_names):
         joint = spec.joint(name)
         joint.armature += scenario.armature
@@ -105,7 +107,7 @@ def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario, servo: Ga
         motor.gainprm = [constant] + [0] * 9
         motor.biasprm = [0] * 10
         if servo is not None:
-            kp, kd = servo.proportional[index], servo.derivative[index]
+            kp, kd = proportional[index], derivative[index]
             motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
             motor.biasprm = [0.0, -constant * kp, -constant * kd] + [0] * 7
             limit = constant * robot.tau_max[index]

@@ -233,7 +233,7 @@ class Balance:
         share = self._share[rows, tick]
         moved = placed(self._geometry, _by_leg(reference), turn, offset, share)
         change = moved.reshape(reference.shape) - reference
-        return np.asarray(self._gains.proportional * change)
+        return np.asarray(self._gains.proportional(change.shape[-1]) * change)
 
 
 def _by_leg(joints: Array) -> Array:

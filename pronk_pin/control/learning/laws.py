@@ -151,12 +151,13 @@ _CUT = 1e-9
 
 _GAIN = Interval(0, 2, below=True)
 _DELTA = Interval(0, 1, below=True)
+_RATE_GAIN = Interval(0, 1e3)
 
 
 def _check_parts(law: str, owner: PDTypeILC | PaperILC | CurrentIterationILC) -> None:
     """The gains and the filter of a law."""
-    if not isinstance(owner, CurrentIterationILC):
-        instance_of(f"{law}: gains", owner.gains, Gains)
+    if not isinstance(owner, CurrentIterationILC) and owner.gains is not None:
+        instance_of(f"{law}: gains", owner.gains, Gains, "a Gains, or None for the robot's own")
     if not callable(owner.filter):
         raise InvalidInput(
             f"{law}: filter={shown(owner.filter)} is no filter; give a ZeroPhaseFilter, or a "
@@ -216,9 +217,12 @@ class FilteredLaw:
     filter: ZeroPhaseFilter
 
     def bind(self: _Filtered, context: LawContext) -> _Filtered:
-        """The law itself; warns with `LeakyFilter` if constant torques do not pass its filter."""
+        """The law for a robot, with its gains; warns with `LeakyFilter` if constant torques do not
+        pass its filter."""
         if isinstance(self.filter, ZeroPhaseFilter):  # it may be any function
             self.filter.warn()
+        if isinstance(self, PDTypeILC | PaperILC) and self.gains is None:
+            return replace(self, gains=Gains.of(context.robot))
         return self
 
 
@@ -226,7 +230,7 @@ class FilteredLaw:
 class PDTypeILC(FilteredLaw):
     """PD-type ILC on a memory that holds the feedforward only, with forgetting.
 
-    `ff <- Q[(1 - leak) ff + gain (Kp e + Kd e')(s + delta)]`
+    `ff <- Q[(1 - leak) ff + gain (Kp e + rate_gain Kd e')(s + delta)]`
 
     Unlike the paper's law its memory holds no feedback torque, so that its learning gain is `gain`
     and not `1 + gain`.
@@ -236,23 +240,27 @@ class PDTypeILC(FilteredLaw):
         leak: Part of the memory that is forgotten in each stride.
         delta: Look-ahead, as a part of the phase s from 0 to 1: how much later the error is read,
             since what a feedforward does takes a while to show in it.
-        gains: Weights of the error and its rate: eq. (10).
+        gains: Weights of the error and its rate, eq. (10); None for the robot's own gains, which
+            the law gets when it is bound, and the paper's before.
+        rate_gain: Weight of the error's rate beside that; 0 for a P-type law.
         filter: The learning filter Q.
     """
 
     gain: float = 0.5
     leak: float = 0.03
     delta: float = 0.06
-    gains: Gains = field(default_factory=Gains)
+    gains: Gains | None = None
+    rate_gain: float = 1.0
     filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter.butterworth(3, 0.08))
 
     def __post_init__(self) -> None:
-        keep_reals(self, {"gain": _GAIN, "leak": SHARE, "delta": _DELTA}, "a PD-type law: ")
+        checks = {"gain": _GAIN, "leak": SHARE, "delta": _DELTA, "rate_gain": _RATE_GAIN}
+        keep_reals(self, checks, "a PD-type law: ")
         _check_parts("a PD-type law", self)
 
     def update(self, record: StrideRecord) -> Array:
         """See `LearningLaw.update`."""
-        correction = _weighted_error(record, self.gains, self.delta)
+        correction = _weighted_error(record, self.gains, self.delta, self.rate_gain)
         return self.filter((1.0 - self.leak) * record.feedforward + self.gain * correction)
 
 
@@ -267,12 +275,12 @@ class PaperILC(FilteredLaw):
 
     Attributes:
         delta: Look-ahead, as a part of the phase s from 0 to 1, into the error.
-        gains: Feedforward gains, in the paper equal to the feedback gains.
+        gains: Feedforward gains, in the paper equal to the feedback gains; None as in `PDTypeILC`.
         filter: Zero-phase filter over recorded torques and errors.
     """
 
     delta: float = 0.06
-    gains: Gains = field(default_factory=Gains)
+    gains: Gains | None = None
     filter: ZeroPhaseFilter = field(default_factory=lambda: ZeroPhaseFilter(PAPER_B, PAPER_A))
 
     def __post_init__(self) -> None:
@@ -318,11 +326,15 @@ class CurrentIterationILC(FilteredLaw):
         return self.filter((1.0 - self.leak) * record.feedforward + self.gain * feedback)
 
 
-def _weighted_error(record: StrideRecord, gains: Gains, delta: float) -> Array:
-    """Kp e(s + delta) + Kd e'(s + delta) [N m], shape (n, samples, 12)."""
+def _weighted_error(
+    record: StrideRecord, gains: Gains | None, delta: float, rate_gain: float = 1.0
+) -> Array:
+    """Kp e(s + delta) + rate_gain Kd e'(s + delta) [N m], shape (n, samples, 12)."""
+    gains = Gains() if gains is None else gains
     error = look_ahead(record.error, delta, record.error_onward)
     rate = look_ahead(record.error_rate, delta, record.rate_onward)
-    return gains.proportional * error + gains.derivative * rate
+    joints = error.shape[-1]
+    return gains.proportional(joints) * error + (rate_gain * gains.derivative(joints)) * rate
 
 
 FLIGHT_LAW = PDTypeILC(
@@ -330,7 +342,7 @@ FLIGHT_LAW = PDTypeILC(
     leak=0.02,
     delta=0.08,
     # The error's rate would learn the vibration of the leg after lift-off.
-    gains=Gains(kd=(0.0, 0.0, 0.0)),
+    rate_gain=0.0,
     filter=ZeroPhaseFilter.butterworth(3, 0.04),
 )
 """Law of the flight: P-type, against the gait's own flight, not the one turned for regulation."""

@@ -123,7 +123,7 @@ class LiftedModel:
         shape = (-1, *self.shape)
         error, rate = error.reshape(shape), rate.reshape(shape)
         joints = self.shape[1]
-        feedback = self.gains.proportional[:joints] * error + self.gains.derivative[:joints] * rate
+        feedback = self.gains.proportional(joints) * error + self.gains.derivative(joints) * rate
         return StrideRecord.of(error, rate, feedback, feedforward.reshape(error.shape))
 
     def stride(self, feedforward: Array, begin: StrideRecord, state: Array) -> StrideRecord:

@@ -12,7 +12,6 @@ from ..._checks import numbers
 from ..._checks import path as known_path
 from ..._typing import Array, BoolArray
 from ...errors import InvalidInput, SpeedOutOfRange
-from ...robot import NL
 from ...storage import read_arrays, write_arrays
 from ..signals import resample
 
@@ -59,7 +58,7 @@ class TorqueLibrary:
         if self.speeds.ndim != 1 or self.torque.ndim != 4 or self.flight.ndim != 1:
             raise InvalidInput(
                 f"speeds, torque and flight of the shapes {self.speeds.shape}, {self.torque.shape} "
-                f"and {self.flight.shape}; give (n,), (n, 2, samples, {NL}) and (n,)"
+                f"and {self.flight.shape}; give (n,), (n, 2, samples, joints) and (n,)"
             )
         lengths = {len(part) for part in (self.torque, self.speeds, self.flight)}
         if self.torque.shape != self.spread.shape or len(lengths) > 1 or not len(self.speeds):

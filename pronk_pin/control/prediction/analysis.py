@@ -15,7 +15,8 @@ import scipy.linalg
 import scipy.sparse.linalg
 
 from ..._typing import Array
-from ...robot import NL
+from ...kinematics import mirror, mirrored
+from ...robot import Robot
 from ..learning import LearningLaw, LiftedModel
 from ..signals import StrideRecord
 
@@ -77,7 +78,13 @@ class Analysis:
     with_delay: dict[int, float]
 
 
-def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = None) -> Analysis:
+def analyze(
+    law: LearningLaw,
+    model: LiftedModel,
+    begin: StrideRecord | None = None,
+    *,
+    robot: Robot | None = None,
+) -> Analysis:
     """Analyse the iteration of a law along a gait: stability, limit and robustness.
 
     Only what is the same on the left and on the right is looked at, since pronking is; and a law's
@@ -87,9 +94,10 @@ def analyze(law: LearningLaw, model: LiftedModel, begin: StrideRecord | None = N
         law: The law; one that needs a model has been given it.
         model: The lifted model of the gait.
         begin: The stride at which the learning begins; `model.planned` by default.
+        robot: The robot, whose left and right are known by it; without one all feedforwards count.
     """
     begin = model.planned if begin is None else begin
-    basis = symmetric_basis(*model.shape)
+    basis = symmetric_basis(*model.shape, robot)
     operator = iteration(law, model, basis)
     size = basis.shape[1]
     within_stride = iteration(law, model.within_a_stride, basis)
@@ -138,7 +146,7 @@ def quasi_static(law: LearningLaw, model: LiftedModel) -> QuasiStatic:
     """Memory and gain of the law for constant records, at mid-stance and for the calf."""
     shape = (1, *model.shape)
     none, ones = np.zeros(shape), np.ones(shape)
-    stiffness = model.gains.proportional[: shape[2]]
+    stiffness = model.gains.proportional(shape[2])
     middle = (0, shape[1] // 2, shape[2] - 1)
     memory = float(law.update(StrideRecord.of(none, none, none, ones))[middle])
     added = float(law.update(StrideRecord.of(ones / stiffness, none, ones, none))[middle])
@@ -171,19 +179,17 @@ def iteration(law: LearningLaw, model: LiftedModel, basis: Array) -> Array:
     return np.asarray(np.vstack(columns).T, dtype=float)
 
 
-def symmetric_basis(samples: int, joints: int) -> Array:
+def symmetric_basis(samples: int, joints: int, robot: Robot | None = None) -> Array:
     """Orthonormal basis of the left-right symmetric feedforwards, shape (samples * joints, m).
 
-    Hips turn in opposite senses. For other robots than ours, with 12 joints, every feedforward.
+    Joints of mirror images turn alike or in opposite senses, as hips do. Without a robot, every
+    feedforward.
     """
-    if joints != NL:
+    if robot is None:
         return np.eye(samples * joints)
-    sides = np.zeros((NL, NL // 2))
-    for pair in range(2):  # front, rear
-        for joint, sign in enumerate((-1.0, 1.0, 1.0)):
-            column = 3 * pair + joint
-            sides[6 * pair + joint, column] = np.sqrt(0.5)
-            sides[6 * pair + 3 + joint, column] = sign * np.sqrt(0.5)
+    images = mirrored(robot, np.eye(joints))  # of each joint
+    left = [3 * leg + joint for leg, _ in mirror(robot).pairs for joint in range(3)]
+    sides = np.sqrt(0.5) * (np.eye(joints) + images)[left].T
     return np.asarray(np.kron(np.eye(samples), sides))
 
 

@@ -10,19 +10,10 @@ import numpy as np
 from ..._typing import Array
 from ...dynamics import NO_ROTORS, Rotors, planar_acceleration, planar_derivatives
 from ...gait import Gait
-from ...robot import NL, Robot
+from ...robot import Robot
 from ..learning import LiftedModel
 from ..signals import SAMPLES, phase_grid
-from .planar_strides import (
-    FREE,
-    PLACE,
-    RATE,
-    SPEED,
-    STATES,
-    PlanarStrides,
-    PlayedPhase,
-    StrideSettings,
-)
+from .planar_strides import PlanarStrides, PlayedPhase, StrideSettings
 
 _STEP = 1e-6
 
@@ -53,19 +44,19 @@ class _Linearised(PlanarStrides):
     def lifted(self) -> LiftedModel:
         """The lifted model along the orbit."""
         stance, flight, landing = self.orbit()
-        played = self.at_ticks(np.eye(SAMPLES))
-        inputs = np.asarray(np.kron(played, np.eye(NL)).reshape(self.ticks, NL, -1), dtype=float)
+        joints, played = self.robot.nu, self.at_ticks(np.eye(SAMPLES))
+        inputs = np.kron(played, np.eye(joints)).reshape(self.ticks, joints, -1).astype(float)
         by_input, by_state = _propagate(self.steps(stance, odometry=True), inputs)
 
         def on_grid(values: Array) -> Array:
-            return self.on_grid(values[: self.ticks]).reshape(SAMPLES * NL, -1)
+            return self.on_grid(values[: self.ticks]).reshape(SAMPLES * joints, -1)
 
         to_touchdown = self.touchdown(landing, len(flight.torques)) @ self.flown(flight)
-        joints, rates = slice(2, FREE), slice(FREE + 2, SPEED)
+        angles, rates = slice(2, self.free), slice(self.free + 2, self.speed)
         return LiftedModel(
-            angle=on_grid(by_input[:, joints]),
+            angle=on_grid(by_input[:, angles]),
             rate=on_grid(by_input[:, rates]),
-            angle_start=on_grid(by_state[:, joints]),
+            angle_start=on_grid(by_state[:, angles]),
             rate_start=on_grid(by_state[:, rates]),
             A=to_touchdown @ by_state[-1],
             B=to_touchdown @ by_input[-1],
@@ -89,27 +80,27 @@ class _Linearised(PlanarStrides):
                 contact="rolling" if stands else None,
                 rotors=self.rotors,
             )
-            A, B = np.eye(STATES), np.zeros((STATES, NL))
-            A[RATE, PLACE] = dt * (at.da_dy - at.da_dtau @ kp)
-            A[RATE, RATE] += dt * (at.da_dv - at.da_dtau @ kd)
-            B[RATE] = dt * at.da_dtau
+            A, B = np.eye(self.speed + 1), np.zeros((self.speed + 1, self.robot.nu))
+            A[self.rate, self.place] = dt * (at.da_dy - at.da_dtau @ kp)
+            A[self.rate, self.rate] += dt * (at.da_dv - at.da_dtau @ kd)
+            B[self.rate] = dt * at.da_dtau
             if odometry:  # leg odometry, filtered
-                A[SPEED, SPEED], A[SPEED, FREE] = 1.0 - share, share
-            A[PLACE] += dt * A[RATE]
-            B[PLACE] = dt * B[RATE]
+                A[self.speed, self.speed], A[self.speed, self.free] = 1.0 - share, share
+            A[self.place] += dt * A[self.rate]
+            B[self.place] = dt * B[self.rate]
             steps.append((A, B))
         return steps
 
     def flown(self, flight: PlayedPhase) -> Array:
         """Derivative of the state at the last tick of flight by that at lift-off, with eq. (12)."""
         ticks = len(flight.torques)
-        thigh = np.tile([0.0, 1.0, 0.0], NL // 3)
+        thigh = self.thigh
         # A turn of the reference by one radian acts as the feedback's torque does.
         turned = self.share[:ticks, None] * self.kp * thigh
         turned = turned + self.share_rate[:ticks, None] * self.kd * thigh
         by_turn, by_state = _propagate(self.steps(flight, odometry=False), turned[..., None])
         end = by_state[-1].copy()
-        end[:, SPEED] += self.settings.regulator.gain * by_turn[-1, :, 0]
+        end[:, self.speed] += self.settings.regulator.gain * by_turn[-1, :, 0]
         return np.asarray(end)
 
     def touchdown(self, landing: Array, tick: int) -> Array:
@@ -117,7 +108,7 @@ class _Linearised(PlanarStrides):
 
         The saltation matrix: `dx+/dx- (1 - x' grad h^T / (grad h . x'))` for the feet's height h.
         """
-        step = _STEP * np.eye(STATES)[: FREE + FREE]
+        step = _STEP * np.eye(self.speed + 1)[: self.free + self.free]
         q = self.q(landing)
         height = np.array(
             [(self.height(self.q(landing + d)) - self.height(self.q(landing - d))) for d in step]
@@ -127,17 +118,18 @@ class _Linearised(PlanarStrides):
             self.robot,
             q,
             self.v(landing),
-            self.kp * (self.flight[tick] - landing[2:FREE])
-            + self.kd * (self.flight_rate[tick] - landing[FREE + 2 : SPEED]),
+            self.kp * (self.flight[tick] - landing[2 : self.free])
+            + self.kd * (self.flight_rate[tick] - landing[self.free + 2 : self.speed]),
             rotors=self.rotors,
         )
-        rates = np.concatenate([landing[RATE], a, [0.0]])
-        saltation = np.eye(STATES)
-        saltation[:, : 2 * FREE] -= np.outer(rates, height) / (height[:FREE] @ landing[RATE])
+        rates = np.concatenate([landing[self.rate], a, [0.0]])
+        saltation = np.eye(self.speed + 1)
+        sinking = height[: self.free] @ landing[self.rate]
+        saltation[:, : 2 * self.free] -= np.outer(rates, height) / sinking
         impact = np.stack(
             [
                 (self.impact(landing + d) - self.impact(landing - d)) / (2.0 * _STEP)
-                for d in _STEP * np.eye(STATES)
+                for d in _STEP * np.eye(self.speed + 1)
             ],
             axis=1,
         )
@@ -154,8 +146,9 @@ def _propagate(steps: list[tuple[Array, Array]], inputs: Array) -> tuple[Array, 
     Returns:
         Shapes (ticks + 1, 29, m) and (ticks + 1, 29, 29).
     """
-    by_input = np.zeros((len(steps) + 1, STATES, inputs.shape[2]))
-    by_state = np.repeat(np.eye(STATES)[None], len(steps) + 1, axis=0)
+    states = len(steps[0][0])
+    by_input = np.zeros((len(steps) + 1, states, inputs.shape[2]))
+    by_state = np.repeat(np.eye(states)[None], len(steps) + 1, axis=0)
     for tick, (A, B) in enumerate(steps):
         by_input[tick + 1] = A @ by_input[tick] + B @ inputs[tick]
         by_state[tick + 1] = A @ by_state[tick]
@@ -164,4 +157,4 @@ def _propagate(steps: list[tuple[Array, Array]], inputs: Array) -> tuple[Array, 
 
 def _on_joints(gains: Array) -> Array:
     """Diagonal gains that read the joints among the free coordinates, shape (12, 14)."""
-    return np.hstack([np.zeros((NL, FREE - NL)), np.diag(gains)])
+    return np.hstack([np.zeros((len(gains), 2)), np.diag(gains)])

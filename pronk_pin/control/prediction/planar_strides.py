@@ -2,7 +2,7 @@
 
 Feet roll without slipping until the ground would have to pull, and touchdown is a plastic impact.
 A state holds the coordinates x, z and the joints, their rates, and the estimate of the speed, 29 in
-all; x is 0 at every touchdown, since no place is like another.
+all with twelve joints; x is 0 at every touchdown, since no place is like another.
 """
 
 from __future__ import annotations
@@ -16,17 +16,11 @@ from ..._typing import Array
 from ...dynamics import Rotors, planar_acceleration, planar_impact
 from ...errors import InvalidInput
 from ...gait import Gait
-from ...kinematics import foot_positions
-from ...robot import NB, NL, Robot, as_robot
+from ...kinematics import foot_positions, leg_geometry
+from ...robot import NB, Robot, as_robot
 from ..feedback import LegAngleRegulator
 from ..signals import SAMPLES, Gains, phase_grid, resample
 
-FREE = 2 + NL
-"""Number of coordinates that the planar constraint leaves free: x, z, joints."""
-SPEED = 2 * FREE
-"""Index of the speed estimate in the state, after the coordinates and their rates."""
-STATES = SPEED + 1
-PLACE, RATE = slice(0, FREE), slice(FREE, SPEED)
 _STRIDES = 40
 _SETTLED = 1e-4
 _LONGEST_FLIGHT = 2.0
@@ -69,6 +63,13 @@ class PlanarStrides:
         gait: The gait.
         settings: The controller's.
         rotors: Rotor inertia and friction of the joints beyond the URDF.
+
+    Attributes:
+        free: Number of coordinates that the planar constraint leaves free: x, z, joints.
+        speed: Index of the speed estimate in the state, after the coordinates and their rates.
+        place: The coordinates in the state.
+        rate: Their rates in it.
+        thigh: Change of the joint angles as the legs turn back by one radian, shape (12,).
     """
 
     def __init__(self, robot: Robot, gait: Gait, settings: StrideSettings, rotors: Rotors) -> None:
@@ -78,7 +79,12 @@ class PlanarStrides:
         instance_of("rotors", rotors, Rotors)
         self.robot, self.gait, self.settings, self.rotors = robot, gait, settings, rotors
         gains, dt = settings.gains, settings.timestep
-        self.kp, self.kd = gains.proportional, gains.derivative
+        self.kp, self.kd = gains.proportional(robot.nu), gains.derivative(robot.nu)
+        self.free = 2 + robot.nu
+        self.speed = 2 * self.free
+        self.place, self.rate = slice(0, self.free), slice(self.free, self.speed)
+        sense = leg_geometry(robot).sense
+        self.thigh = (sense * np.array([0.0, 1.0, 0.0])).ravel()
         self.ticks = round(gait.stance.duration / dt)
         s = np.arange(self.ticks, dtype=np.float64) * (dt / gait.stance.duration)
         self.stance, self.stance_rate = gait.stance.joint_reference(s)
@@ -116,8 +122,8 @@ class PlanarStrides:
         """Joint errors [rad] and rates [rad/s] of a stance on the phase grid, (samples, 12)."""
         states = stance.states[:-1]
         return (
-            self.on_grid(self.stance - states[:, 2:FREE]),
-            self.on_grid(self.stance_rate - states[:, FREE + 2 : SPEED]),
+            self.on_grid(self.stance - states[:, 2 : self.free]),
+            self.on_grid(self.stance_rate - states[:, self.free + 2 : self.speed]),
         )
 
     def orbit(self) -> tuple[PlayedPhase, PlayedPhase, Array]:
@@ -152,14 +158,14 @@ class PlanarStrides:
         stands = True
         share = self.settings.timestep / (self.settings.speed_filter + self.settings.timestep)
         for tick in range(self.ticks):
-            error = self.stance[tick] - state[2:FREE]
-            rate = self.stance_rate[tick] - state[FREE + 2 : SPEED]
+            error = self.stance[tick] - state[2 : self.free]
+            rate = self.stance_rate[tick] - state[self.free + 2 : self.speed]
             torques.append(self.torque[tick] + self.kp * error + self.kd * rate)
-            estimate = state[SPEED] + share * (state[FREE] - state[SPEED])
+            estimate = state[self.speed] + share * (state[self.free] - state[self.speed])
             # Early in stance feet that would have to be pulled are about to be pressed down again.
             bound = tick < _HALF * self.ticks
             state, stands = self.step(state, torques[-1], stands, bound=bound)
-            state[SPEED] = estimate
+            state[self.speed] = estimate
             states.append(state)
             standing.append(stands)
         return PlayedPhase(np.array(states), np.array(torques), standing)
@@ -168,12 +174,12 @@ class PlanarStrides:
         """Play one flight until the feet are down: its whole ticks, and the state at touchdown."""
         states, torques = [state], []
         standing: list[bool] = []
-        turn = float(self.settings.regulator.turn(state[SPEED] - self.lift_off_speed))
-        thigh = np.tile([0.0, 1.0, 0.0], NL // 3)
+        turn = float(self.settings.regulator.turn(state[self.speed] - self.lift_off_speed))
+        thigh = self.thigh
         for tick in range(len(self.flight)):
-            error = self.flight[tick] + self.share[tick] * turn * thigh - state[2:FREE]
+            error = self.flight[tick] + self.share[tick] * turn * thigh - state[2 : self.free]
             rate = self.flight_rate[tick] + self.share_rate[tick] * turn * thigh
-            rate = rate - state[FREE + 2 : SPEED]
+            rate = rate - state[self.free + 2 : self.speed]
             torques.append(self.kp * error + self.kd * rate)
             following, stands = self.step(state, torques[-1], stands)
             above, below = (self.height(self.q(at)) for at in (state, following))
@@ -203,15 +209,15 @@ class PlanarStrides:
             stands = False
             a, _ = planar_acceleration(self.robot, q, v, torque, rotors=self.rotors)
         following = state.copy()
-        following[RATE] += dt * a
-        following[PLACE] += dt * following[RATE]
+        following[self.rate] += dt * a
+        following[self.place] += dt * following[self.rate]
         return following, stands
 
     def impact(self, state: Array) -> Array:
         """State at the beginning of stance, after the impact, from that at the end of flight."""
         after = state.copy()
-        after[RATE] = planar_impact(
-            self.robot, self.q(state), state[None, RATE], contact="rolling", rotors=self.rotors
+        after[self.rate] = planar_impact(
+            self.robot, self.q(state), state[None, self.rate], contact="rolling", rotors=self.rotors
         )[0]
         after[0] = 0.0
         return after
@@ -222,12 +228,12 @@ class PlanarStrides:
 
     def q(self, state: Array) -> Array:
         """Configuration, shape (19,)."""
-        q = np.zeros(NB + 1 + NL)
-        q[0], q[2], q[6], q[NB + 1 :] = state[0], state[1], 1.0, state[2:FREE]
+        q = np.zeros(self.robot.nq)
+        q[0], q[2], q[6], q[NB + 1 :] = state[0], state[1], 1.0, state[2 : self.free]
         return q
 
     def v(self, state: Array) -> Array:
         """Velocity, shape (18,)."""
-        v = np.zeros(NB + NL)
-        v[0], v[2], v[NB:] = state[FREE], state[FREE + 1], state[FREE + 2 : SPEED]
+        v = np.zeros(self.robot.nv)
+        v[[0, 2]], v[NB:] = np.split(state[self.rate], [2])
         return v

@@ -56,6 +56,6 @@ def rehearse(strides: PlanarStrides, law: LearningLaw, begin: StrideRecord, numb
             break
         error, rate = strides.stance_errors(stance)
         errors[k], rate = error + error_offset, rate + rate_offset
-        feedback = gains.proportional * errors[k] + gains.derivative * rate
+        feedback = gains.feedback(errors[k], rate)
         record = StrideRecord.of(errors[k][None], rate[None], feedback[None], feedforward)
     return errors

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..._checks import Interval, whole
 from ..._typing import Array, BoolArray, IntArray
-from ...robot import NL
 
 PARTS = ("stance", "flight")
 """Parts of a stride; arrays with an axis for them hold the stance first."""
@@ -103,9 +102,9 @@ class StrideRecord:
     robot: IntArray
 
     @classmethod
-    def unknown(cls, n: int) -> StrideRecord:
+    def unknown(cls, n: int, joints: int) -> StrideRecord:
         """Make the record of n robots that have made no stride yet: NaN."""
-        curve, onward = (n, SAMPLES, NL), (n, ONWARD, NL)
+        curve, onward = (n, SAMPLES, joints), (n, ONWARD, joints)
         return cls(
             error=np.full(curve, np.nan),
             error_rate=np.full(curve, np.nan),

@@ -7,18 +7,21 @@ so that servos can play a whole tape from its set points `ff + kp q_d + kd v_d` 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..._checks import Interval, keep_vectors
+from ..._checks import Interval, keep_vectors, real
 from ..._typing import Array, IntArray
-from ...robot import NL
+from ...robot import Robot, feedback_gains
+
+_STIFFNESS = Interval(0, 1e4)
 
 
 @dataclass(frozen=True)
 class Gains:
-    """Diagonal gains of a leg, in the order hip, thigh, calf.
+    """Diagonal gains of a leg, in the order hip, thigh, calf; the defaults are the paper's.
 
     Attributes:
         kp: Proportional gains [N m/rad].
@@ -32,15 +35,28 @@ class Gains:
         proportional, derivative = Interval(0, 1e5, "N m/rad"), Interval(0, 1e4, "N m s/rad")
         keep_vectors(self, {"kp": proportional, "kd": derivative}, prefix="feedback gains: ")
 
-    @property
-    def proportional(self) -> Array:
-        """Proportional gains of all joints [N m/rad], shape (12,)."""
-        return np.tile(self.kp, NL // 3)
+    @classmethod
+    def of(cls, robot: Robot) -> Gains:
+        """A robot's own gains: those of its specification, or the A1's, scaled by its size."""
+        return cls(*feedback_gains(robot))
 
-    @property
-    def derivative(self) -> Array:
-        """Derivative gains of all joints [N m s/rad], shape (12,)."""
-        return np.tile(self.kd, NL // 3)
+    def proportional(self, joints: int) -> Array:
+        """Proportional gains of a robot's joints, by leg [N m/rad], shape (joints,)."""
+        return np.resize(self.kp, joints)
+
+    def derivative(self, joints: int) -> Array:
+        """Derivative gains of a robot's joints, by leg [N m s/rad], shape (joints,)."""
+        return np.resize(self.kd, joints)
+
+    def scaled(self, stiffness: float) -> Gains:
+        """Gains of a multiple of the stiffness; the damping goes with its root, as its ratio asks.
+
+        Args:
+            stiffness: The multiple, 0 or more.
+        """
+        root = math.sqrt(real("stiffness", stiffness, _STIFFNESS))
+        kp, kd = np.multiply(stiffness, self.kp), np.multiply(root, self.kd)
+        return Gains(tuple(kp.tolist()), tuple(kd.tolist()))
 
     def feedback(self, error: Array, error_rate: Array) -> Array:
         """Compute the feedback torque Kp e + Kd e' [N m], eq. (9); 0 where a sensor failed.
@@ -51,8 +67,9 @@ class Gains:
             error: Reference minus measured joint angles [rad], shape (..., 12).
             error_rate: Its time derivative [rad/s], shape (..., 12).
         """
-        feedback = self.proportional * error
-        feedback += self.derivative * error_rate
+        joints = error.shape[-1]
+        feedback = self.proportional(joints) * error
+        feedback += self.derivative(joints) * error_rate
         if not np.isfinite(feedback.sum()):
             feedback[~np.isfinite(feedback)] = 0.0
         return feedback
@@ -111,9 +128,9 @@ class Tape:
 
     def setpoint(self, gains: Gains) -> Array:
         """Set points of servos with these gains: the torque at q = v = 0 [N m], (n, ticks, 12)."""
-        return (
-            self.feedforward + gains.proportional * self.position + gains.derivative * self.velocity
-        )
+        joints = self.position.shape[-1]
+        pulled = self.feedforward + gains.proportional(joints) * self.position
+        return np.asarray(pulled + gains.derivative(joints) * self.velocity)
 
 
 def clip_torque(feedback: Array, feedforward: Array, tau_max: Array) -> Array:

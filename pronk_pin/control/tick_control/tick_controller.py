@@ -26,7 +26,6 @@ import numpy as np
 
 from ..._typing import Array, IntArray
 from ...errors import InvalidInput
-from ...robot import NL
 from ..feedback import TrunkEstimate
 from ..signals import ControlContext
 
@@ -190,11 +189,11 @@ class TickLoop:
                 f"{self._name}: its period must be a whole number of time steps of "
                 f"{context.timestep:g} s"
             )
-        n = len(context.gaits)
+        n, joints = len(context.gaits), context.robot.nu
         self._period, self._limit = max(1, round(steps)), context.robot.tau_max
         self._age = np.zeros(n, dtype=np.intp)  # ticks since it was first asked
-        self._held = SetPoints(*np.zeros((len(SetPoints._fields), n, NL)))
-        self.previous = np.zeros((n, NL))
+        self._held = SetPoints(*np.zeros((len(SetPoints._fields), n, joints)))
+        self.previous = np.zeros((n, joints))
         self.time = ControlTime()
         self._reset(np.arange(n))
 
@@ -232,12 +231,12 @@ class TickLoop:
 
     def _hold(self, asked: Observation, answer: Array | SetPoints) -> None:
         """Keep what was answered."""
-        rows = asked.rows
+        rows, wanted = asked.rows, asked.joints.shape
         if not isinstance(answer, SetPoints):
-            if np.shape(answer) != (len(rows), NL):
+            if np.shape(answer) != wanted:
                 raise InvalidInput(
                     f"{self._name} answers {type(answer).__name__} of shape {np.shape(answer)}; "
-                    f"let it answer torques of shape {(len(rows), NL)}, or SetPoints"
+                    f"let it answer torques of shape {wanted}, or SetPoints"
                 )
             answer = SetPoints(0.0, feedforward=answer)
         for held, part in zip(self._held, answer, strict=True):
@@ -245,8 +244,7 @@ class TickLoop:
                 held[rows] = part  # type: ignore[index]
             except (ValueError, TypeError) as error:
                 raise InvalidInput(
-                    f"{self._name} answers set points that do not broadcast to "
-                    f"{(len(rows), NL)} ({error})"
+                    f"{self._name} answers set points that do not broadcast to {wanted} ({error})"
                 ) from error
             measured = np.isfinite(asked.joints + asked.joint_rates).all(axis=1)
             if not np.isfinite(held[rows[measured]]).all():  # type: ignore[index]

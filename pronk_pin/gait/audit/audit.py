@@ -16,7 +16,7 @@ import numpy as np
 from ..._typing import Array
 from ...dynamics import planar_rows
 from ...errors import GaitNotFound
-from ...kinematics import contact_jacobian, foot_positions
+from ...kinematics import contact_jacobian, foot_positions, mirror
 from ...robot import NB
 from .. import bezier
 from ..checks import Audit, Check
@@ -133,13 +133,12 @@ def _residual(solution: GaitSolution) -> tuple[Check, Check]:
 def _symmetry(solution: GaitSolution) -> Check:
     """Bilateral symmetry: distance of the right feet from the mirror image of the left ones [m]."""
     robot = solution.problem.robot
-    left = [i for i, leg in enumerate(robot.legs) if leg.endswith("L")]
-    right = [i for i, leg in enumerate(robot.legs) if leg.endswith("R")]
+    left, right = np.transpose(mirror(robot).pairs)
     by_phase = {}
     for name, motion in solution.motions.items():
         feet = foot_positions(robot, motion.q)  # (nodes, 4, 3)
-        mirror = feet[:, left] - feet[:, right] * np.array([1.0, -1.0, 1.0])
-        by_phase[name] = (motion, mirror)
+        apart = feet[:, left] - feet[:, right] * np.array([1.0, -1.0, 1.0])
+        by_phase[name] = (motion, apart)
     return _worst("mirror symmetry", by_phase)
 
 

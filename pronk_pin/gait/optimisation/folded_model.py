@@ -24,10 +24,9 @@ import casadi as ca
 import numpy as np
 
 from ..._typing import Array, BoolArray, IntArray
-from ...errors import InvalidInput
-from ...kinematics import Contact
+from ...kinematics import Contact, mirror
 from ...robot import JOINTS, SLIDING, Base, Robot
-from .newton_euler import BASE_COORDINATES, FrameMotion, mirrored, newton_euler
+from .newton_euler import BASE_COORDINATES, FrameMotion, newton_euler
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,18 +87,16 @@ class FoldedModel:
 
     def leg_index(self) -> IntArray:
         """For each leg of the robot, which leg of the folded robot moves it, shape (4,)."""
-        kept = {leg: i for i, leg in enumerate(self.legs)}
-        kept.update({mirrored(leg): i for i, leg in enumerate(self.legs)})
-        return np.array([kept[leg] for leg in self.robot.legs], dtype=np.intp)
+        kept = {leg: i for i, pair in enumerate(mirror(self.robot).pairs) for leg in pair}
+        return np.array([kept[leg] for leg in range(len(self.robot.legs))], dtype=np.intp)
 
     def joint_index(self) -> IntArray:
         """For each joint of the robot, which joint of the folded robot moves it, shape (12,)."""
         return _leg_joints(self.leg_index())
 
     def joint_sign(self) -> Array:
-        """-1 for the joints that the mirror reverses (the right hips), else 1, shape (12,)."""
-        reversed_ = np.array([joint == "hip" for joint in JOINTS])
-        return np.where(self._right()[:, None] & reversed_, -1.0, 1.0).ravel()
+        """-1 for the joints that the mirror reverses (the A1's right hips), else 1, (12,)."""
+        return np.where(self._right()[:, None], mirror(self.robot).sign, 1.0).ravel()
 
     def force_sign(self) -> Array:
         """-1 where the mirror reverses a contact force (right feet, y), else 1, shape (4, 3)."""
@@ -134,14 +131,9 @@ def fold(robot: Robot, contact: Contact = "rolling", base: Base = "locked") -> F
     """Fold a robot on its mirror plane.
 
     Raises:
-        InvalidInput: The legs do not come in pairs named ..L and ..R.
+        InvalidInput: The legs do not come in pairs, left and right.
     """
-    legs = tuple(leg for leg in robot.legs if leg.endswith("L"))
-    if sorted([*legs, *map(mirrored, legs)]) != sorted(robot.legs):
-        raise InvalidInput(
-            f"the legs {', '.join(robot.legs)} do not pair left and right; "
-            "name them ..L and ..R in the RobotSpec"
-        )
+    legs = tuple(robot.legs[left] for left, _ in mirror(robot).pairs)
     nq = BASE_COORDINATES[base] + len(legs) * len(JOINTS)
     q, v, a = (ca.SX.sym(name, nq) for name in "qva")
     lam = ca.SX.sym("lam", 3, len(legs))

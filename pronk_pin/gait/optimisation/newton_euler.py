@@ -1,7 +1,8 @@
 """Recursive Newton-Euler in CasADi, over the trunk and its left legs, in world axes.
 
-Links, joint axes and inertias are Pinocchio's. The tree is short and every leg is alike, so that
-world axes, with classical accelerations, keep it plain.
+Links, joint axes and inertias are Pinocchio's, turned into the trunk's axes at zero joint angles.
+The tree is short and every leg is alike, so that world axes, with classical accelerations, keep it
+plain.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from ..._typing import Array
+from ...kinematics import leg_frames, mirror
 from ...robot import JOINTS, Base, Robot
 
 BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3}
@@ -22,8 +24,6 @@ BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3}
 
 Half = Literal["mean", "difference"]
 """Part of a pair of legs: their mean, or half their difference, left less right."""
-
-_MIRROR = {"L": "R", "R": "L"}
 
 
 class FrameMotion(NamedTuple):
@@ -55,6 +55,11 @@ class _Inertia(NamedTuple):
             0.5 * (self.second + sign * other.second),
         )
 
+    def turned(self, rotation: Array) -> _Inertia:
+        """The same inertia in turned axes."""
+        second = rotation @ self.second @ rotation.T
+        return _Inertia(self.mass, rotation @ self.first, second)
+
     def mirrored(self) -> _Inertia:
         """Mirror image about the plane y = 0."""
         flip = np.array([1.0, -1.0, 1.0])
@@ -63,16 +68,15 @@ class _Inertia(NamedTuple):
 
 @dataclass(frozen=True)
 class _Link:
-    """A link as Pinocchio has it, with the joint that carries it.
+    """A link with the joint that carries it, in the trunk's axes at zero joint angles.
 
     Attributes:
-        rotation, translation: Placement of the joint in its parent, shapes (3, 3) and (3,).
-        axis: Joint axis in the joint's frame, shape (3,).
-        body: Inertia, in the joint's frame.
+        translation: From the joint above to this one [m], shape (3,).
+        axis: Joint axis, shape (3,).
+        body: Inertia about the joint.
         armature: Inertia of the rotor as the joint feels it [kg m^2].
     """
 
-    rotation: Array
     translation: Array
     axis: Array
     body: _Inertia
@@ -154,7 +158,7 @@ def _leg(
     motions, axes, wrenches, rotors = [], [], [], []
     for link, q, v, a in zip(links, *map(ca.vertsplit, joints), strict=True):
         motion = _moved(motion, rotation @ ca.DM(link.translation))
-        rotation = rotation @ ca.sparsify(ca.DM(link.rotation)) @ _rotation(link.axis, q)
+        rotation = rotation @ _rotation(link.axis, q)
         axis = rotation @ ca.sparsify(ca.DM(link.axis))
         motion = motion._replace(
             omega=motion.omega + axis * v,
@@ -165,8 +169,7 @@ def _leg(
         wrenches.append(_wrench(link.body, rotation, motion, gravity))
         rotors.append(link.armature * a)
 
-    frame = robot.model.frames[robot.foot_ids[robot.legs.index(leg)]]
-    foot = _moved(motion, rotation @ ca.DM(frame.placement.translation))
+    foot = _moved(motion, rotation @ ca.DM(leg_frames(robot, leg).foot))
     force, point = -lam, foot.position + lever
     moment = ca.SX.zeros(3)
     torques = []
@@ -213,26 +216,23 @@ def _rotation(axis: Array, angle: ca.SX) -> ca.SX:
 def _links(robot: Robot, leg: str, half: Half) -> list[_Link]:
     """The links of a leg from the trunk down, with their share of the pair's inertias."""
     links, sign = [], 1.0 if half == "mean" else -1.0
-    names = zip(robot.spec.leg_joints(leg), robot.spec.leg_joints(mirrored(leg)), strict=True)
-    for own, other in names:
-        i, j = robot.model.getJointId(own), robot.model.getJointId(other)
-        placement, image = robot.model.jointPlacements[i], _inertia(robot, j).mirrored()
-        armature = [float(robot.model.armature[robot.model.joints[k].idx_v]) for k in (i, j)]
+    other = robot.legs[mirror(robot).partner[robot.legs.index(leg)]]
+    frames, images = leg_frames(robot, leg), leg_frames(robot, other)
+    names = zip(robot.spec.leg_joints(leg), robot.spec.leg_joints(other), strict=True)
+    for k, joints in enumerate(names):
+        i, j = (robot.model.getJointId(name) for name in joints)
+        own = _inertia(robot, i).turned(frames.rotation[k])
+        image = _inertia(robot, j).turned(images.rotation[k]).mirrored()
+        armature = [float(robot.model.armature[robot.model.joints[n].idx_v]) for n in (i, j)]
         links.append(
             _Link(
-                rotation=np.array(placement.rotation),
-                translation=np.array(placement.translation),
-                axis=np.array(robot.model.joints[i].createData().S).ravel()[3:],
-                body=_inertia(robot, i).paired(image, sign),
+                translation=frames.offset[k],
+                axis=np.round(frames.axis[k]),  # the trunk's, as `leg_geometry` has made sure
+                body=own.paired(image, sign),
                 armature=0.5 * (armature[0] + sign * armature[1]),
             )
         )
     return links
-
-
-def mirrored(leg: str) -> str:
-    """Name of the leg on the other side: FL and FR, RL and RR."""
-    return leg[:-1] + _MIRROR[leg[-1]]
 
 
 def _inertia(robot: Robot, joint: int) -> _Inertia:

@@ -9,7 +9,6 @@ import xarray as xr
 from pronk_pin import Robot
 from pronk_pin.compare import Results
 from pronk_pin.compare.metrics.effort import effort
-from pronk_pin.robot import NL
 
 DT, TICKS, LAST = 0.001, 200, 3
 
@@ -20,7 +19,7 @@ def strides(speed: float, power: float) -> xr.Dataset:
     time = DT * np.arange(LAST * 2 * TICKS).reshape(shape)
     base = np.stack([speed * time, np.full(shape, 0.3)], axis=-1)
     base_rate = np.stack([np.full(shape, speed), np.zeros(shape)], axis=-1)
-    rates, torque = np.zeros((*shape, NL)), np.zeros((*shape, NL))
+    rates, torque = np.zeros((*shape, 12)), np.zeros((*shape, 12))
     rates[..., 2], torque[..., 2] = 4.0, power / 4.0
     rates[..., 5], torque[..., 5] = 4.0, -power
     tick = ("speed", "last", "part", "tick")
@@ -29,7 +28,7 @@ def strides(speed: float, power: float) -> xr.Dataset:
         {
             "tick_base": ((*tick, "axis"), base),
             "tick_base_rate": ((*tick, "axis"), base_rate),
-            "tick_joints": (joint, np.zeros((*shape, NL))),
+            "tick_joints": (joint, np.zeros((*shape, 12))),
             "tick_joint_rates": (joint, rates),
             "tick_torque": (joint, torque),
         },

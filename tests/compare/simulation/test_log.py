@@ -12,6 +12,7 @@ from pronk_pin.compare.world import Motion
 from pronk_pin.control import SAMPLES as CONTROL_SAMPLES
 from pronk_pin.control import Gains, StrideRecord, Tape, phase_grid
 from pronk_pin.gait import Gait
+from pronk_pin.robot import load_robot
 
 DT = 0.001
 SHAPE = (1, CONTROL_SAMPLES, 12)
@@ -22,7 +23,7 @@ STANCE, FLIGHT = 160, 201
 
 def ticks(length: int, z: Array, *, joint: float = 0.0) -> TickLog:
     """A phase of the second robot that moves 1 mm along x in a tick; nothing behind its end."""
-    log = TickLog(2, 400)
+    log = TickLog(2, 400, load_robot())
     log.base[1], log.joints[1] = 99.0, 99.0  # what lies behind the end must not be read
     log.base[1, :length, 0], log.base[1, :length, 1] = 1e-3 * np.arange(length), z
     log.joints[1, :length], log.feedforward[1], log.feedback[1] = joint, 3.0, 2.0
@@ -137,7 +138,7 @@ def test_far_from_the_end_no_ticks_are_kept(log: StrideLog) -> None:
 
 
 def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
-    log, rows, rng = TickLog(3, 50), np.array([0, 2]), np.random.default_rng(0)
+    log, rows, rng = TickLog(3, 50, load_robot()), np.array([0, 2]), np.random.default_rng(0)
     states = rng.normal(size=(2, 20, 28))
     force, path = rng.normal(size=(2, 20, 4, 3)), np.zeros((2, 21, 1))
     joints, rates = states[..., :12], states[..., 12:24]
@@ -155,8 +156,8 @@ def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
     np.testing.assert_array_equal(log.force[rows, 5:25], force)
     np.testing.assert_array_equal(log.pose[rows, 5:25], pose)
     np.testing.assert_array_equal(phase.twist[:, 5:], twist)
-    asked = feedforward[:, 5:] + gains.proportional * (reference[:, 5:] - joints)
-    asked -= gains.derivative * rates
+    asked = feedforward[:, 5:] + gains.proportional(12) * (reference[:, 5:] - joints)
+    asked -= gains.derivative(12) * rates
     np.testing.assert_allclose((phase.feedback + phase.feedforward)[:, 5:], asked)
     given = phase.feedback + phase.feedforward + phase.missing
     np.testing.assert_allclose(given[:, 5:], np.clip(asked, -20.0, 20.0), atol=1e-12)
@@ -165,7 +166,7 @@ def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
 
 
 def test_the_last_ticks_of_a_phase_become_the_first_of_the_next() -> None:
-    log, rows = TickLog(2, 50), np.arange(2)
+    log, rows = TickLog(2, 50, load_robot()), np.arange(2)
     log.joints[:] = np.arange(50.0)[:, None]
     log.rewind(rows, np.array([30, 41]), 2)
     np.testing.assert_array_equal(log.joints[:, :2, 0], [[30.0, 31.0], [41.0, 42.0]])

@@ -36,8 +36,8 @@ def stiff(robot: Robot, scenario: Scenario, x: Array, seconds: float) -> World:
     start = np.column_stack([x, np.full(len(x), robot.standing[2])])
     world.reset(start, np.tile(standing, (len(x), 1)))
     for _ in range(round(seconds / scenario.timestep)):
-        feedback = 5.0 * gains.proportional * (standing - world.joints)
-        world.step(feedback - gains.derivative * world.joint_rates)
+        feedback = 5.0 * gains.proportional(12) * (standing - world.joints)
+        world.step(feedback - gains.derivative(12) * world.joint_rates)
     return world
 
 

@@ -51,8 +51,8 @@ def stand(robot: Robot, world: World, joints: Array, seconds: float) -> None:
     height = np.full((world.n, 1), robot.standing[2])
     world.reset(np.hstack([np.zeros_like(height), height]), joints)
     for _ in range(round(seconds / world.scenario.timestep)):
-        feedback = 5.0 * gains.proportional * (joints - world.joints)
-        world.step(feedback - gains.derivative * world.joint_rates)
+        feedback = 5.0 * gains.proportional(12) * (joints - world.joints)
+        world.step(feedback - gains.derivative(12) * world.joint_rates)
 
 
 @pytest.mark.parametrize(
@@ -316,7 +316,7 @@ def test_a_touchdown_is_felt_within_the_ticks_that_the_controller_reckons_with(
         feet = foot_positions(robot, robot.q_from_base(position, world.joints))
         clearance.append(feet[..., 2].min(axis=1) - robot.foot_radius)
         load.append(world.force[..., 2].sum(axis=1))
-        world.step(Gains().proportional * (standing - world.joints))
+        world.step(Gains().proportional(12) * (standing - world.joints))
     threshold = load_controller("pd").contact.touchdown * robot.mass * robot.gravity
     felt = np.argmax(np.array(load) > threshold, axis=0)
     for height, tick in zip(np.array(clearance).T, felt, strict=True):

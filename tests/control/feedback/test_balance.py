@@ -17,10 +17,10 @@ from pronk_pin.control import (
     attitude_error,
     roll_pitch_yaw,
 )
-from pronk_pin.control.learning.symmetry import mirrored, symmetric
+from pronk_pin.control.learning.symmetry import symmetric
 from pronk_pin.errors import InvalidInput
 from pronk_pin.gait import load_library
-from pronk_pin.kinematics import foot_positions, inverse_kinematics
+from pronk_pin.kinematics import foot_positions, inverse_kinematics, mirrored
 from pronk_pin.kinematics.contacts import contact_jacobian
 from pronk_pin.robot import Robot
 from pronk_pin.robot.conventions import rotation_matrix
@@ -87,7 +87,7 @@ def test_feet_are_put_down_as_if_the_trunk_had_the_gaits_attitude(robot: Robot) 
     turned[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.1, 0.08, -0.1)).coeffs()
     trunk = (turned[None, :7], np.zeros((1, 6)))
     added = balance(robot).torque(1, ROWS, tick, trunk, q[None, 7:], q[None, 7:])[0]
-    turned[7:] += added / Gains().proportional
+    turned[7:] += added / Gains().proportional(12)
     np.testing.assert_allclose(foot_positions(robot, turned) - q[:3], wanted, atol=1e-9)
 
 
@@ -98,7 +98,7 @@ def test_a_trunk_that_drifts_to_the_left_puts_its_feet_further_left(robot: Robot
     law.lift_off(ROWS, np.array([0.3]))
     added = law.torque(1, ROWS, tick, (q[None, :7], np.zeros((1, 6))), q[None, 7:], q[None, 7:])[0]
     moved = q.copy()
-    moved[7:] += added / Gains().proportional
+    moved[7:] += added / Gains().proportional(12)
     aside = foot_positions(robot, moved) - foot_positions(robot, q)
     np.testing.assert_allclose(
         aside, np.tile([0.0, 0.3 * FootPlacement().gain, 0.0], (4, 1)), atol=1e-9

@@ -30,7 +30,7 @@ from pronk_pin.control import (
 )
 from pronk_pin.errors import InvalidInput
 
-KP = Gains().proportional
+KP = Gains().proportional(12)
 LOAD = 6.0 * np.linspace(-1.0, 1.0, 12)  # [N m]
 SHAPE = (1, SAMPLES, 12)
 
@@ -89,7 +89,7 @@ def test_an_error_is_answered_earlier_by_the_look_ahead() -> None:
 def test_the_rate_of_the_error_is_weighted_with_the_derivative_gains() -> None:
     ones, none = np.ones(SHAPE), np.zeros(SHAPE)
     learned = PDTypeILC(gain=0.5, leak=0.0).update(StrideRecord.of(none, ones, none, none))
-    np.testing.assert_allclose(learned[0, 80], 0.5 * Gains().derivative, rtol=1e-6)
+    np.testing.assert_allclose(learned[0, 80], 0.5 * Gains().derivative(12), rtol=1e-6)
 
 
 @pytest.mark.parametrize("settings", [{"gain": 2.0}, {"leak": 1.1}, {"delta": -0.1}])

@@ -40,7 +40,7 @@ def begin_of(strides: PlanarStrides) -> StrideRecord:
     """The model's own stride under feedback alone."""
     error, rate = (curve[None] for curve in strides.stance_errors(strides.orbit()[0]))
     gains = strides.settings.gains
-    feedback = gains.proportional * error + gains.derivative * rate
+    feedback = gains.proportional(12) * error + gains.derivative(12) * rate
     return StrideRecord.of(error, rate, feedback, np.zeros_like(error))
 
 

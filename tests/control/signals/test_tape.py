@@ -16,8 +16,8 @@ def random_tape(n: int, ticks: int) -> Tape:
 
 
 def test_the_gains_are_the_papers_for_each_leg_from_hip_to_calf() -> None:
-    np.testing.assert_array_equal(GAINS.proportional, [35.0, 60.0, 90.0] * 4)
-    np.testing.assert_array_equal(GAINS.derivative, [1.0, 6.0, 2.0] * 4)
+    np.testing.assert_array_equal(GAINS.proportional(12), [35.0, 60.0, 90.0] * 4)
+    np.testing.assert_array_equal(GAINS.derivative(12), [1.0, 6.0, 2.0] * 4)
 
 
 def test_the_feedback_is_that_of_eq_9_and_nothing_where_a_sensor_failed() -> None:
@@ -33,7 +33,7 @@ def test_the_feedback_is_that_of_eq_9_and_nothing_where_a_sensor_failed() -> Non
 def test_servos_that_are_told_the_set_points_give_feedforward_plus_feedback() -> None:
     tape = random_tape(3, 10)
     q, v = np.random.default_rng(1).normal(size=(2, 3, 10, 12))
-    servo = tape.setpoint(GAINS) - GAINS.proportional * q - GAINS.derivative * v
+    servo = tape.setpoint(GAINS) - GAINS.proportional(12) * q - GAINS.derivative(12) * v
     expected = tape.feedforward + GAINS.feedback(tape.position - q, tape.velocity - v)
     np.testing.assert_allclose(servo, expected)
 

@@ -15,6 +15,7 @@ from pronk_pin.control import (
     Controller,
     ControllerSpec,
     ExtendedStateObserver,
+    Gains,
     Observation,
     load_controller,
     model_feedforward,
@@ -88,7 +89,7 @@ def test_a_constant_disturbance_is_rejected(robot: Robot, gaits: list[Gait]) -> 
     joints = Joints(robot, gaits, 0, 20.0 * np.cos(np.arange(12.0)))
     for k in range(TICKS):
         torque, needed = joints.tick(k)
-    feedback = SPEC.gains.feedback(-joints.position, -joints.velocity)
+    feedback = Gains().feedback(-joints.position, -joints.velocity)
     found = torque - joints.feedforward - feedback
     np.testing.assert_allclose(found, -needed[..., 0], atol=0.01 * np.abs(needed).max())
 
@@ -123,7 +124,7 @@ def test_each_part_of_the_stride_begins_without_a_disturbance(
     measured = (phase, joints.position[1:], joints.velocity[1:], np.zeros((1, 4)), None)
     wanted = (still, still, still, joints.feedforward[1:], still)
     torque = control.command(Observation(np.array([1]), 0, 2, *measured, *wanted))
-    feedback = SPEC.gains.feedback(-joints.position[1:], -joints.velocity[1:])
+    feedback = Gains().feedback(-joints.position[1:], -joints.velocity[1:])
     np.testing.assert_array_equal(torque, feedback + joints.feedforward[1:])
     np.testing.assert_array_equal(control.disturbance, [before[0], np.zeros(12)])
 
