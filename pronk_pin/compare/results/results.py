@@ -32,6 +32,7 @@ import xarray as xr
 
 from ..._checks import instance_of
 from ..._checks import path as known_path
+from ..._display import Displayed
 from ...errors import FileProblem, InvalidInput
 from ...storage import read_bytes, reading, sealed, sha256, write_file
 from ..experiment import Cell, Definition, Experiment, cell_definition, define, describe
@@ -48,8 +49,8 @@ from .summary_file import SUMMARY, read_summary, write_summary
 PARITY = "parity.json"
 
 
-@dataclass(frozen=True)
-class Results:
+@dataclass(frozen=True, repr=False)
+class Results(Displayed):
     """A results folder.
 
     Attributes:
@@ -60,18 +61,17 @@ class Results:
     folder: Path
     experiment: Experiment
     _summaries: dict[tuple[str, str], pd.DataFrame] = field(
-        default_factory=dict, init=False, repr=False, compare=False
+        default_factory=dict, init=False, compare=False
     )
     """The summary that was written or read last, by the digests of the strides and of its file."""
 
-    def __repr__(self) -> str:
-        experiment = self.experiment
-        names = (experiment.controller_names, experiment.scenario_names)
-        return (
-            f"<Results in {self.folder}: {experiment.robot_name}, base {experiment.base}, "
-            f"{len(experiment.speeds)} speeds, {len(experiment.seeds)} seeds, "
-            f"controllers {' '.join(names[0])}, scenarios {' '.join(names[1])}>"
-        )
+    def _title(self) -> str:
+        return f"Results in {self.folder}"
+
+    def _facts(self) -> dict[str, str]:
+        cells = self.experiment.cells()
+        there = sum(self.path(cell).exists() for cell in cells)
+        return {"simulated": f"{there} of {len(cells)} cells", **self.experiment.facts}
 
     @classmethod
     def load(cls, folder: Path | str) -> Results:
