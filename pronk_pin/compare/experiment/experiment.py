@@ -117,6 +117,8 @@ class Experiment(Displayed):
             if len(values) == 0 or len(set(values)) != len(values):
                 raise InvalidInput(f"{name} must name at least one, and none of them twice")
         self._check_controllers()
+        for world in worlds:
+            world.check_joints(self.model)
         if self.mjcf:
             keep(self, "mjcf", str(Path(self.mjcf).expanduser().resolve()))
         keep(self, "speeds", tuple(sorted(self.speeds)))

@@ -162,7 +162,7 @@ def compare_prediction(
     law = learning_law(spec)
     robot, gait = recorded_robot(strides.attrs), load_library(strides.attrs["robot"]).at(speed)
     settings = StrideSettings(spec.gains, spec.regulator, spec.speed_filter, spec.touchdown_ticks)
-    rotors = Rotors(scenario.armature, scenario.damping)
+    rotors = Rotors(*(scenario.by_joint(name, robot) for name in ("armature", "damping")))
     model = lifted_model(robot, gait, settings, rotors=rotors)
     if isinstance(law, ModelBasedILC):
         law = law.with_models([lifted_model(robot, gait, settings)])
