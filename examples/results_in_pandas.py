@@ -1,6 +1,7 @@
 """A result as tables and arrays: `python examples/results_in_pandas.py [folder]`.
 
-`summary()` is one long table, a row a number; `strides()` the labelled strides of one simulation.
+`summary()` is one long table, a row a number; `dataset()` the labelled strides of all simulations,
+of which what is asked for is read.
 """
 
 import sys
@@ -18,9 +19,10 @@ if __name__ == "__main__":
     calf = summary.query("metric == 'peak_error' and joint == 'calf'")
     print(calf.pivot(index="speed", columns="controller", values="value").round(4))
 
-    strides = results.strides(results.find(controller="ilc"))
-    peaks = strides["peak_error"].groupby("kind").mean()  # over the legs
-    history = peaks.sel(kind="calf").to_pandas()
+    strides = results.dataset()  # controller x scenario x seed x speed x stride x ...
+    nominal = strides.sel(scenario="nominal", seed=0)
+    peaks = nominal["peak_error"].groupby("kind").mean()  # over the legs
+    history = peaks.sel(kind="calf", controller="ilc").to_pandas()
     print(history.iloc[:, ::3].round(3).to_string())
-    learned = strides["feedforward"].isel(stride=-1).sel(part="stance")
-    print(f"largest learned torque {float(abs(learned).max()):.1f} N m")
+    learned = nominal["feedforward"].sel(controller="ilc", part="stance")
+    print(f"largest learned torque {float(abs(learned).max()):.1f} {learned.units}")

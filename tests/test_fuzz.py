@@ -26,6 +26,7 @@ import pytest
 from pronk_pin import Robot, RobotSpec, load_robot
 from pronk_pin.cli import main
 from pronk_pin.compare import Experiment, Results, Schedule, load_scenario, run_experiment
+from pronk_pin.compare.experiment.description import describe
 from pronk_pin.compare.world.mjcf import ForeignRobot, mjcf_sha256, mjcf_spec
 from pronk_pin.compare.world.scenario import Scenario
 from pronk_pin.control import TorqueLibrary
@@ -624,7 +625,7 @@ def read_result(folder: Path) -> object:
     """Everything that a results folder says; who made it and when may be lost."""
     results = Results.load(folder)
     _ = results.provenance
-    found: list[object] = [repr(results.experiment), results.summary().to_csv()]
+    found: list[object] = [repr(describe(results.experiment)), results.summary().to_csv()]
     found.append(None if results.foreign is None else results.foreign.parity.table(full=True))
     for cell in results.experiment.cells():
         strides = results.strides(cell)

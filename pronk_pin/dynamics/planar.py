@@ -90,11 +90,11 @@ def planar_dynamics(
 
 
 class Rotors(NamedTuple):
-    """Rotor inertia and viscous friction of a joint beyond the URDF, the same for all joints."""
+    """Rotor inertia and viscous friction of the joints beyond the URDF, of all or each (12,)."""
 
-    armature: float = 0.0
+    armature: float | Array = 0.0
     """Rotor inertia as the joint feels it [kg m^2]."""
-    damping: float = 0.0
+    damping: float | Array = 0.0
     """Viscous friction [N m s/rad]."""
 
 
@@ -152,7 +152,7 @@ def planar_derivatives(
         robot, (q, v, a), np.asarray(solution[free:].reshape(-1, 3), dtype=float), legs, radius
     )
     r_q, r_v, c_q, c_v = (part[:, rows] for part in parts)
-    r_v = r_v[rows] + rotors.damping * np.diag(_joints(robot))
+    r_v = r_v[rows] + np.diag(_at_joints(robot, rotors.damping))
     sides = np.block([[-r_q[rows], -r_v, motors], [-c_q, -c_v, np.zeros((len(c_q), robot.nu))]])
     da_dy, da_dv, da_dtau = np.hsplit(np.linalg.solve(kkt, sides)[:free], [free, 2 * free])
     return PlanarDerivatives(a[rows], da_dy, da_dv, da_dtau)
@@ -197,19 +197,19 @@ def _equations(
     """Matrix and right-hand side of eq. (5) on the free rows, with what the joints add."""
     feet = () if contact is None else robot.legs
     kkt, right = planar_equations(robot, q, v, tau, contact=contact or "rolling", feet=feet)
-    joints = _joints(robot)
-    free = np.arange(len(joints))
-    kkt[free, free] += rotors.armature * joints
-    right[free] -= rotors.damping * joints * v[planar_rows(robot)]
+    rows = planar_rows(robot)
+    free = np.arange(len(rows))
+    kkt[free, free] += _at_joints(robot, rotors.armature)
+    right[free] -= _at_joints(robot, rotors.damping) * v[rows]
     return kkt, right
 
 
 def _mass(robot: Robot, q: Array, rotors: Rotors) -> Array:
     rows = planar_rows(robot)
     mass = pin.crba(robot.model, robot.data, q)[np.ix_(rows, rows)]
-    return np.asarray(mass + rotors.armature * np.diag(_joints(robot)))
+    return np.asarray(mass + np.diag(_at_joints(robot, rotors.armature)))
 
 
-def _joints(robot: Robot) -> Array:
-    """1 for each joint and 0 for x and z, shape (14,)."""
-    return np.concatenate([np.zeros(2), np.ones(robot.nu)])
+def _at_joints(robot: Robot, value: float | Array) -> Array:
+    """A value at each joint, and 0 for x and z, shape (14,)."""
+    return np.concatenate([np.zeros(2), np.broadcast_to(value, robot.nu)])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from .._display import Displayed
 from ..errors import InvalidInput
 
 TOLERANCE = 1e-8
@@ -139,8 +140,8 @@ class StoredAudit:
     checks: Mapping[str, tuple[float, str]]
 
 
-@dataclass(frozen=True)
-class Audit:
+@dataclass(frozen=True, repr=False)
+class Audit(Displayed):
     """Result of the audit of one gait.
 
     Attributes:
@@ -154,6 +155,18 @@ class Audit:
     motion: str
     constraints: tuple[Check, ...]
     checks: tuple[Check, ...]
+
+    def _title(self) -> str:
+        return f"Audit of the gait at {self.speed:g} m/s: {'passed' if self.passed else 'FAILED'}"
+
+    def _facts(self) -> dict[str, str]:
+        worst = self.worst_violation if self.constraints else None
+        return {
+            "checks": f"{len(self.checks)}, and {len(self.constraints)} constraints",
+            "failed": ", ".join(check.name for check in self.failures),
+            "worst": f"{worst.name}, {worst.value:.1e} {worst.unit}" if worst else "",
+            "motion": self.motion[:12],
+        }
 
     @property
     def passed(self) -> bool:

@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from .._checks import instance_of, real, sequence_of, text
+from .._display import Displayed
 from .._typing import Array
 from ..errors import InvalidInput
 from ..robot import NB, Robot, as_numbers, as_robot
@@ -89,8 +90,8 @@ def _phases(s: Array) -> Array:
     return s
 
 
-@dataclass(frozen=True)
-class GaitPhase:
+@dataclass(frozen=True, repr=False)
+class GaitPhase(Displayed):
     """One phase of a gait; its arrays are read-only.
 
     Attributes:
@@ -118,6 +119,16 @@ class GaitPhase:
             coefficients = np.asarray(getattr(self, name), dtype=np.float64).view()
             coefficients.flags.writeable = False
             object.__setattr__(self, name, coefficients)
+
+    def _title(self) -> str:
+        return f"GaitPhase {self.name}"
+
+    def _facts(self) -> dict[str, str]:
+        return {
+            "duration": f"{self.duration:.4g} s",
+            "feet": ", ".join(self.feet) or "none stands",
+            "order": str(self.joints.shape[-1] - 1),
+        }
 
     def joint_reference(self, s: Array) -> tuple[Array, Array]:
         """Joint angles [rad] and velocities [rad/s] at the phases s, each of shape (n, 12)."""
@@ -159,8 +170,8 @@ class GaitPhase:
         )
 
 
-@dataclass(frozen=True)
-class Gait:
+@dataclass(frozen=True, repr=False)
+class Gait(Displayed):
     """A periodic motion of a robot at one speed.
 
     Attributes:
@@ -174,6 +185,17 @@ class Gait:
     speed: float
     apex: float
     phases: tuple[GaitPhase, ...]
+
+    def _title(self) -> str:
+        return f"Gait of {self.robot} at {self.speed:g} m/s"
+
+    def _facts(self) -> dict[str, str]:
+        durations = (f"{phase.name} {phase.duration:.4g} s" for phase in self.phases)
+        return {
+            "apex": f"{self.apex:g} m",
+            "phases": ", ".join(durations),
+            "sha256": self.sha256[:12],
+        }
 
     @cached_property
     def sha256(self) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 
 from .._checks import instance_of, none_or, real, sequence_of
 from .._checks import path as known_path
+from .._display import Displayed, spanned
 from .._typing import Array
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange
 from ..kinematics import Contact
@@ -33,8 +34,8 @@ _SAME = 1e-9
 """Speeds [m/s] or heights [m] closer than this are one."""
 
 
-@dataclass(frozen=True, eq=False)
-class GaitLibrary:
+@dataclass(frozen=True, eq=False, repr=False)
+class GaitLibrary(Displayed):
     """Gaits of one robot, on a grid of speeds and apex heights.
 
     Attributes:
@@ -92,13 +93,20 @@ class GaitLibrary:
     def __hash__(self) -> int:
         return hash((self.robot, self.sha256))
 
-    def __repr__(self) -> str:
-        n, speeds, apexes = len(self.gaits), self.speeds, self.apexes
-        heights = f"{apexes[0]:g}" if len(apexes) == 1 else f"{apexes[0]:g} to {apexes[-1]:g}"
-        return (
-            f"<GaitLibrary of {self.robot}, base {self.base}: {n} gaits, {speeds[0]:g} to "
-            f"{speeds[-1]:g} m/s, apex {heights} m>"
-        )
+    def _title(self) -> str:
+        return f"GaitLibrary of {self.robot}, base {self.base}: {len(self.gaits)} gaits"
+
+    def _facts(self) -> dict[str, str]:
+        failed = sum(not audit.passed for audit in self.audit)
+        audit = "all passed" if not failed else f"{failed} of {len(self.audit)} failed"
+        return {
+            "speeds": spanned(self.speeds, "m/s"),
+            "apexes": spanned(self.apexes, "m"),
+            "default apex": f"{self.apex:g} m" if len(self.apexes) > 1 else "",
+            "phases": ", ".join(phase.name for phase in self.gaits[0].phases),
+            "audit": audit if self.audit else "none",
+            "sha256": self.sha256[:12],
+        }
 
     @property
     def robot(self) -> str:

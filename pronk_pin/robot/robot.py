@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ import numpy as np
 import pinocchio as pin
 
 from .._checks import instance_of, numbers
+from .._display import Displayed
 from .._typing import Array, IntArray
 from ..errors import InvalidInput
 from ..storage import from_text
@@ -53,8 +54,8 @@ NB = 6
 """Velocities of the floating base."""
 
 
-@dataclass(frozen=True, eq=False)
-class Robot:
+@dataclass(frozen=True, eq=False, repr=False)
+class Robot(Displayed):
     """A legged robot: Pinocchio's model with its names, limits and parameters.
 
     Attributes:
@@ -71,13 +72,26 @@ class Robot:
 
     spec: RobotSpec
     urdf_path: Path
-    urdf: bytes = field(repr=False)
+    urdf: bytes
     package_dir: Path
     model: pin.Model
     foot_radius: float
     urdf_joint_names: tuple[str, ...]
     parameters: ModelParameters = NOTHING
-    bare: Robot | None = field(default=None, repr=False)
+    bare: Robot | None = None
+
+    def _title(self) -> str:
+        return f"Robot {self.name}"
+
+    def _facts(self) -> dict[str, str]:
+        changed = vars(self.parameters).items() - vars(NOTHING).items()
+        return {
+            "URDF": str(self.urdf_path),
+            "mass": f"{self.mass:.2f} kg",
+            "joints": ", ".join(self.joint_names),
+            "torques": f"up to {max(self.tau_max, default=0.0):g} N m",
+            "parameters": ", ".join(f"{name} {value}" for name, value in sorted(changed)),
+        }
 
     def with_parameters(self, parameters: ModelParameters) -> Robot:
         """The robot with rotors, friction, motors and load that its URDF leaves out.

@@ -15,6 +15,7 @@ from typing import Annotated, Any, TypeAlias
 from tyro.conf import Suppress
 
 from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
+from ..._display import Displayed, listed, spanned
 from ...control import CONTROLLERS, PARTS, ControllerSpec, load_controller
 from ...errors import InvalidInput
 from ...gait import SPEEDS, STYLES, Gait, GaitLibrary, load_library
@@ -50,8 +51,8 @@ Metrics: TypeAlias = Annotated[tuple[str | Metric, ...], by_names("[MODULE:OBJEC
 Scenarios: TypeAlias = Annotated[tuple[str | Scenario, ...], by_names("[NAME|MODULE:OBJECT [...]]")]
 
 
-@dataclass(frozen=True)
-class Experiment:
+@dataclass(frozen=True, repr=False)
+class Experiment(Displayed):
     """A comparison of controllers; the same object in Python, on the command line and on disk.
 
     Robot, gaits, controllers and scenarios are given by name, or as objects of one's own. What is
@@ -116,6 +117,8 @@ class Experiment:
             if len(values) == 0 or len(set(values)) != len(values):
                 raise InvalidInput(f"{name} must name at least one, and none of them twice")
         self._check_controllers()
+        for world in worlds:
+            world.check_joints(self.model)
         if self.mjcf:
             keep(self, "mjcf", str(Path(self.mjcf).expanduser().resolve()))
         keep(self, "speeds", tuple(sorted(self.speeds)))
@@ -132,6 +135,29 @@ class Experiment:
         # Objects of one's own need not be hashable.
         names = (self.robot_name, self.controller_names, self.scenario_names)
         return hash((names, self.speeds, self.seeds, self.base, self.mjcf, self.schedule))
+
+    def _title(self) -> str:
+        return "Experiment"
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What is asked, in words, by what it is about."""
+        gaits, mjcf, schedule = self.gaits, self.mjcf, self.schedule
+        apex = "" if self.apex is None else f", apex {self.apex:g} m"
+        return {
+            "robot": f"{self.robot_name}, base {self.base}",
+            "gaits": (gaits if isinstance(gaits, str) else f"a library of {gaits.robot}") + apex,
+            "speeds": spanned(self.speeds, "m/s"),
+            "controllers": listed(self.controller_names),
+            "scenarios": listed(self.scenario_names),
+            "seeds": listed(self.seeds),
+            "mjcf": mjcf,
+            "schedule": f"{schedule.baseline:g} s of baseline, {schedule.learning:g} s of learning",
+            "metrics": listed(map(name_of, self.metrics)),
+        }
+
+    def _facts(self) -> dict[str, str]:
+        return self.facts
 
     def _check_types(self) -> None:
         known_name("base", self.base, BASES)

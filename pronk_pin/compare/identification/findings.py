@@ -99,6 +99,7 @@ def remarks(explanation: Explanation) -> list[str]:
         *_of_the_rest(explanation),
         *_of_internal_forces(explanation),
         *_of_the_ground(explanation),
+        *_of_the_motors(explanation),
         *_of_confounding(explanation),
     ]
 
@@ -186,6 +187,17 @@ def _of_the_ground(explanation: Explanation) -> Iterator[str]:
         yield (
             f"Not one of the terms: gravity is {ground.gravity:.2f} m/s^2, and {usual:g} in the "
             "model."
+        )
+
+
+def _of_the_motors(explanation: Explanation) -> Iterator[str]:
+    """Motors that truly differ, where a simulation knows them and one term stands for all."""
+    by_kind = [explanation.true.get(f"{joint} weak motors", np.nan) for joint in JOINTS]
+    if np.isfinite(by_kind).all() and any(term.name == "weak motors" for term in explanation.terms):
+        weak = ", ".join(f"{w:.3f} in the {j}s" for j, w in zip(JOINTS, by_kind, strict=True))
+        yield (
+            f"The motors are not all as weak: {weak}. The one estimate is of all of them, and its "
+            "true value their mean."
         )
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 import xarray as xr
 
+from ..._typing import Array
 from ...errors import FileProblem, InvalidInput
 from ...robot import JOINTS, Robot
 from ..world import Scenario, build_model, mjcf_sha256
@@ -15,7 +18,9 @@ def truth(robot: Robot, scenario: Scenario) -> dict[str, float]:
     """The terms' true parameters by name: what the simulated robot has beyond its model.
 
     They are read from the world as it is simulated, whether its robot is the URDF's or that of an
-    MJCF: of a kind of joint the mean over the legs, of the masses those of the trunk.
+    MJCF: of a kind of joint the mean over the legs, of the masses those of the trunk. Motors that
+    differ are as weak as their mean, and besides that there is the truth of each kind, "calf weak
+    motors" say.
 
     Args:
         robot: The robot as its URDF has it.
@@ -26,7 +31,7 @@ def truth(robot: Robot, scenario: Scenario) -> dict[str, float]:
         InvalidInput: The MJCF is of another robot.
     """
     world = build_model(robot, scenario)
-    return {**_of_joints(robot, world), **_of_trunk(robot, world), **_of_motors(scenario)}
+    return {**_of_joints(robot, world), **_of_trunk(robot, world), **_of_motors(robot, scenario)}
 
 
 def true_parameters(robot: Robot, strides: xr.Dataset) -> dict[str, float]:
@@ -43,10 +48,10 @@ def true_parameters(robot: Robot, strides: xr.Dataset) -> dict[str, float]:
         if scenario.mjcf:
             digest = mjcf_sha256(scenario.mjcf)
             if strides.attrs.get("mjcf_sha256", digest) != digest:
-                return _of_motors(scenario)
+                return _of_motors(robot, scenario)
         return truth(robot, scenario)
     except (FileProblem, InvalidInput):
-        return _of_motors(scenario)
+        return _of_motors(robot, scenario)
 
 
 def _of_joints(robot: Robot, world: mujoco.MjModel) -> dict[str, float]:
@@ -56,11 +61,13 @@ def _of_joints(robot: Robot, world: mujoco.MjModel) -> dict[str, float]:
         "damping": world.dof_damping[dofs] - robot.of_joint("damping"),
         "Coulomb": world.dof_frictionloss[dofs] - robot.of_joint("coulomb"),
     }
-    return {
-        f"{joint} {name}": float(values[robot.joint_kinds == kind].mean())
-        for name, values in beyond.items()
-        for kind, joint in enumerate(JOINTS)
-    }
+    return {key: v for name, values in beyond.items() for key, v in _by_kind(robot, name, values)}
+
+
+def _by_kind(robot: Robot, name: str, values: Array) -> Iterator[tuple[str, float]]:
+    """Means over the legs of values of each joint (12,), by the name of a term."""
+    for kind, joint in enumerate(JOINTS):
+        yield f"{joint} {name}", float(values[robot.joint_kinds == kind].mean())
 
 
 def _of_trunk(robot: Robot, world: mujoco.MjModel) -> dict[str, float]:
@@ -77,6 +84,10 @@ def _of_trunk(robot: Robot, world: mujoco.MjModel) -> dict[str, float]:
     return {"payload": payload, "trunk moment x": x, "trunk moment z": z}
 
 
-def _of_motors(scenario: Scenario) -> dict[str, float]:
-    """They are the scenario's, whatever the robot."""
-    return {"weak motors": 1.0 - scenario.torque_constant, "delay": scenario.delay}
+def _of_motors(robot: Robot, scenario: Scenario) -> dict[str, float]:
+    """They are the scenario's, whatever the robot's own."""
+    if isinstance(scenario.torque_constant, float):
+        return {"weak motors": 1.0 - scenario.torque_constant, "delay": scenario.delay}
+    weak = 1.0 - scenario.by_joint("torque_constant", robot)
+    by_kind = dict(_by_kind(robot, "weak motors", weak))
+    return {"weak motors": float(weak.mean()), **by_kind, "delay": scenario.delay}

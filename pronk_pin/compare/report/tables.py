@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import pandas as pd
 
 from ...robot import JOINTS
 from ..metrics import in_family, robots, table_1
-from ..world import load_scenario
+from ..world import Scenario, shipped_scenario
 
 SHOWN = ("calf", "thigh")
 """Joints of the paper's Table I."""
@@ -32,7 +32,9 @@ SHOWN_PARAMETERS = {
 """What is drawn of a sampled scenario and matters to every base: column, factor of it, format."""
 
 
-def sampled_scenarios(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
+def sampled_scenarios(
+    summary: pd.DataFrame, *, scenario: str, worlds: Iterable[str | Scenario] = ()
+) -> pd.DataFrame:
     """Each sampled scenario of a family: what it is like, and the mean errors in it.
 
     Means are over the robots that did not fall.
@@ -40,6 +42,7 @@ def sampled_scenarios(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     Args:
         summary: See `compare.metrics`.
         scenario: The family.
+        worlds: Scenarios of one's own among them; of one that is not known there are errors only.
 
     Returns:
         Rows by world, from the one in which learning (`ilc`) leaves the smallest calf error to the
@@ -49,10 +52,12 @@ def sampled_scenarios(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     family_rows = in_family(summary, scenario)
     controllers = list(dict.fromkeys(family_rows["controller"]))
     columns: dict[tuple[str, str], Any] = {}
-    scenarios = {name: load_scenario(name) for name in family_rows["scenario"].unique()}
+    own = {world.name: world for world in worlds if isinstance(world, Scenario)}
+    names = family_rows["scenario"].unique()
+    scenarios = {name: own.get(name) or shipped_scenario(name) for name in names}
     for attribute in SHOWN_PARAMETERS:
         columns["scenario", attribute] = pd.Series(
-            {name: getattr(values, attribute) for name, values in scenarios.items()}
+            {name: getattr(world, attribute, np.nan) for name, world in scenarios.items()}
         )
     for joint, name in itertools.product(SHOWN, controllers):
         peaks = robots(family_rows, scenario=scenario, controller=name, joint=joint)

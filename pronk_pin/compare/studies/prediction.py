@@ -164,7 +164,7 @@ def compare_prediction(
     settings = StrideSettings(
         spec.gains_of(robot), spec.regulator, spec.speed_filter, spec.touchdown_ticks
     )
-    rotors = Rotors(scenario.armature, scenario.damping)
+    rotors = Rotors(*(scenario.by_joint(name, robot) for name in ("armature", "damping")))
     model = lifted_model(robot, gait, settings, rotors=rotors)
     if isinstance(law, ModelBasedILC):
         law = law.with_models([lifted_model(robot, gait, settings)])

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, TypeAlias
 
@@ -25,8 +25,10 @@ from ..._checks import (
     instance_of,
     keep_reals,
     keep_vectors,
+    known_name,
     none_or,
     real,
+    reals,
     text,
     whole,
 )
@@ -39,19 +41,27 @@ from ..._registry import (
     is_address,
     source_sha256,
 )
+from ..._typing import Array
 from ...errors import InvalidInput, UnknownName
-from ...robot import ROBOTS
+from ...robot import ROBOTS, Robot
 from ...storage import from_text
 from .mismatch import KNOWN, NOISE
 from .sensors import Sensors
 
 Vector: TypeAlias = tuple[float, float, float]
 
-_NUMBERS = {
+ByJoint: TypeAlias = float | tuple[float, ...]
+"""A number for all joints, one for each kind of joint (hip, thigh, calf), or one for each joint in
+the order of q."""
+
+_BY_JOINT = {
     "armature": Interval(0, 1, "kg m^2"),
     "damping": Interval(0, 50, "N m s/rad"),
     "coulomb": Interval(0, 50, "N m"),
     "torque_constant": Interval(0, 10, above=True),
+}
+"""What the joints' parameters can be, each of them."""
+_NUMBERS = {
     "full_torque_speed": Interval(0, 1000, "rad/s"),
     "delay": Interval(0, 0.2, "s"),
     "touchdown_latency": Interval(0, 0.05, "s"),
@@ -87,6 +97,9 @@ class Scenario:
 
     A slope is played as gravity that leans back, so that the ground's frame stays the world's: x
     goes up the slope, z stands on it, and a locked trunk stays parallel to it.
+
+    `armature`, `damping`, `coulomb` and `torque_constant` are of all joints alike, or of each kind
+    of joint, `(hip, thigh, calf)`, or of each joint in the order of `Robot.joint_names`.
 
     Attributes:
         name: Short name, as on the command line.
@@ -127,10 +140,10 @@ class Scenario:
     """
 
     name: str
-    armature: float = 0.0
-    damping: float = 0.0
-    coulomb: float = 0.0
-    torque_constant: float = 1.0
+    armature: ByJoint = 0.0
+    damping: ByJoint = 0.0
+    coulomb: ByJoint = 0.0
+    torque_constant: ByJoint = 1.0
     full_torque_speed: float = 0.0
     no_load_speed: float | None = None
     delay: float = 0.0
@@ -160,6 +173,11 @@ class Scenario:
         file_name("name of a scenario", self.name)
         prefix = f"scenario '{self.name}': "
         keep_reals(self, _NUMBERS, prefix)
+        for name, within in _BY_JOINT.items():
+            value = getattr(self, name)
+            several = isinstance(value, Sequence | np.ndarray) and np.ndim(value) > 0
+            check = reals if several else real
+            object.__setattr__(self, name, check(prefix + name, value, within))
         keep_vectors(self, _VECTORS, prefix=prefix)
         speeds = Interval(0, 1000, "rad/s", above=True)
         no_load = none_or(real, f"{prefix}no_load_speed", self.no_load_speed, speeds)
@@ -200,6 +218,36 @@ class Scenario:
     def __radd__(self, other: str) -> Scenario:
         """A scenario by name with the mismatches of this one."""
         return load_scenario(other) + self
+
+    def by_joint(self, name: str, robot: Robot) -> Array:
+        """One of the joints' parameters for every joint of a robot, in the order of q, (12,).
+
+        Joints of no leg have no share in values by kind.
+
+        Args:
+            name: "armature", "damping", "coulomb" or "torque_constant".
+            robot: The robot.
+
+        Raises:
+            InvalidInput: There are more or fewer values than kinds, or joints.
+        """
+        value = getattr(self, known_name("parameter of joints", name, _BY_JOINT))
+        kinds = robot.spec.joints
+        if isinstance(value, float):
+            return np.full(robot.nu, value)
+        if len(value) == len(kinds):
+            return np.append(value, getattr(type(self), name))[robot.joint_kinds]
+        if len(value) != robot.nu:
+            raise self._wrong(
+                f"{name} has {len(value)} values; for the {robot.name} give one number, "
+                f"{len(kinds)} ({', '.join(kinds)}), or {robot.nu}, one for each joint"
+            )
+        return np.array(value)
+
+    def check_joints(self, robot: Robot) -> None:
+        """Check that the joints' parameters are those of a robot; errors as for `by_joint`."""
+        for name in _BY_JOINT:
+            self.by_joint(name, robot)
 
     def _mismatches(self) -> Iterator[tuple[str, Any]]:
         for known in fields(self):

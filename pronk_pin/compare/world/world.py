@@ -44,6 +44,9 @@ def build_model(
         scenario: What the world adds to that.
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         servo: Gains of servos at the joints, see `World`; without them torque motors.
+
+    Raises:
+        InvalidInput: The scenario has values of another number of joints, or its `edit` fails.
     """
     as_robot(robot)
     instance_of("scenario", scenario, Scenario, "a Scenario, as load_scenario() returns it")
@@ -91,15 +94,17 @@ def _edited(spec: mujoco.MjSpec, scenario: Scenario) -> mujoco.MjModel:
 
 def _add_motors(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario, servo: Gains | None) -> None:
     """A motor at every joint; rotor and friction come on top of the joint's own."""
-    constant = scenario.torque_constant
+    names = ("armature", "damping", "coulomb", "torque_constant")
+    values = np.stack([scenario.by_joint(name, robot) for name in names], axis=-1)  # (12, 4)
     if servo is not None:
         proportional, derivative = servo.proportional(robot.nu), servo.derivative(robot.nu)
-    for index, name in enumerate(robot.joint_names):
+    for index, (name, own) in enumerate(zip(robot.joint_names, values.tolist(), strict=True)):
+        armature, damping, coulomb, constant = own
         joint = spec.joint(name)
-        joint.armature += scenario.armature
+        joint.armature += armature
         linear, *higher = joint.damping
-        joint.damping = [linear + scenario.damping, *higher]
-        joint.frictionloss += scenario.coulomb
+        joint.damping = [linear + damping, *higher]
+        joint.frictionloss += coulomb
         # The default time constant of 0.02 s would smear Coulomb friction into a damper.
         joint.solref_friction = [0.002, 1]
         joint.actfrclimited = False  # the limit is the controller's or the servo's business

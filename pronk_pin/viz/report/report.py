@@ -171,7 +171,8 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     if len(families(results.experiment.scenario_names)) > 1:
         figures_by_name |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
     for world in filter(sampled, families(results.experiment.scenario_names)):
-        table = sampled_scenarios(results.summary(), scenario=world)
+        worlds = results.experiment.scenarios
+        table = sampled_scenarios(results.summary(), scenario=world, worlds=worlds)
         figures_by_name[f"{world}-by-world"] = figures.by_scenario(table)
     return [
         save_figure(figure, folder / f"{name}.{suffix}")
@@ -320,7 +321,7 @@ def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
 
 def _sampled(document: Document, results: Results, summary: pd.DataFrame, scenario: str) -> None:
     """What the worlds of a family are like, and what comes out in each."""
-    table = sampled_scenarios(summary, scenario=scenario)
+    table = sampled_scenarios(summary, scenario=scenario, worlds=results.experiment.scenarios)
     document.heading("Scenario by scenario", f"{scenario}-each", level=3)
     document.picture(f"{scenario}-by-world", figures.by_scenario(table), _CAPTIONS["by-world"])
     document.text(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from ...compare.metrics import LEARNER, RIVAL, Interval
@@ -87,7 +88,10 @@ def each_scenario(table: pd.DataFrame) -> pd.DataFrame:
     """The table of `sampled_scenarios` as texts."""
     shown = {}
     for attribute, (label, factor, form) in SHOWN_PARAMETERS.items():
-        shown[label] = [number(factor * value, form) for value in table["scenario", attribute]]
+        shown[label] = [
+            " / ".join(number(factor * each, form) for each in np.atleast_1d(value))
+            for value in table["scenario", attribute]
+        ]
     for joint in SHOWN:
         for controller in in_order(table[joint].columns):
             label = f"{joint}: {LABELS.get(controller, controller)}"

@@ -21,6 +21,7 @@ from pronk_pin.compare import (
     Schedule,
     build_model,
     load_scenario,
+    random_scenarios,
     run_cell,
     run_experiment,
     summarize,
@@ -332,6 +333,42 @@ def test_our_metrics_are_listed_with_their_units(laboratory: str) -> None:
     summary = run_experiment(experiment, "all", workers=1, progress=False).summary()
     for metric, unit in set(zip(summary["metric"], summary["unit"], strict=True)):
         assert METRICS[metric][0] == unit
+
+
+LEGS = Scenario("legs", torque_constant=(1.0, 0.9, 0.8), coulomb=np.full(12, 0.3))  # type: ignore[arg-type]
+
+
+def test_values_by_joint_are_kept_as_they_were_given(tmp_path: Path) -> None:
+    """In config.json, by hand, and in the record of strides: numbers stay numbers."""
+    assert LEGS.coulomb == (0.3,) * 12
+    described = json.loads(json.dumps(describe(LEGS)))
+    assert (described["armature"], described["torque_constant"]) == (0.0, [1.0, 0.9, 0.8])
+    assert restore(described, Scenario, "it") == LEGS
+    assert Scenario.from_json(LEGS.to_json()) == LEGS
+    assert isinstance(describe(load_scenario("nominal"))["armature"], float)
+    path = tmp_path / "mine.yaml"
+    path.write_text("scenarios: [{name: legs, armature: [0.01, 0.02, 0.03], damping: 0.1}]")
+    by_hand = read_config(path).scenario("legs")
+    assert (by_hand.armature, by_hand.damping) == ((0.01, 0.02, 0.03), 0.1)
+    path.write_text("scenarios: [{name: legs, armature: [0.01, 0.02]}]")
+    with pytest.raises(FileProblem, match=r"armature has 2 values; for the a1 give one number, 3"):
+        read_config(path)
+    assert (LEGS + "slope").torque_constant == LEGS.torque_constant
+    with pytest.raises(InvalidInput, match="both change torque_constant"):
+        LEGS + "weak-motors"
+
+
+def test_a_family_of_sampled_worlds_with_something_of_ones_own(tmp_path: Path) -> None:
+    worlds = tuple(
+        replace(world, name=f"{world.name}+legs", torque_constant=LEGS.torque_constant)
+        for world in random_scenarios(2, 0)
+    )
+    experiment = Experiment(
+        speeds=(0.3,), controllers=("pd", "ilc", "model"), scenarios=worlds, schedule=SHORT
+    )
+    results = run_experiment(experiment, tmp_path / "family", workers=1, progress=False)
+    assert cli.main(["report", str(results.folder)]) == 0
+    assert "100% / 90% / 80%" in (results.folder / "report.md").read_text()
 
 
 def test_scenarios_are_added() -> None:

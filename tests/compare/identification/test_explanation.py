@@ -360,6 +360,45 @@ def test_the_truth_of_an_mjcf_is_its_own(robot: Robot, tmp_path: Path) -> None:
     assert true["weak motors"] == 0.0
 
 
+LEGS = Scenario(
+    "legs",
+    armature=(0.01, 0.015, 0.02),
+    damping=(0.1, 0.2, 0.4),
+    coulomb=(0.2, 0.3, 0.4),
+    torque_constant=(1.0, 0.95, 0.9),
+)
+
+
+def test_the_truth_is_told_by_kind(robot: Robot) -> None:
+    true = truth(robot, LEGS)
+    for k, joint in enumerate(("hip", "thigh", "calf")):
+        assert true[f"{joint} armature"] == pytest.approx(LEGS.armature[k])  # type: ignore[index]
+        assert true[f"{joint} damping"] == pytest.approx(LEGS.damping[k])  # type: ignore[index]
+        assert true[f"{joint} Coulomb"] == pytest.approx(LEGS.coulomb[k])  # type: ignore[index]
+    assert [true[f"{joint} weak motors"] for joint in ("hip", "thigh", "calf")] == pytest.approx(
+        [0.0, 0.05, 0.1]
+    )
+    assert true["weak motors"] == pytest.approx(0.05)
+    one_leg = dataclasses.replace(LEGS, damping=(0.4,) * 3 + (0.0,) * 9)
+    assert truth(robot, one_leg)["calf damping"] == pytest.approx(0.1)  # the mean over the legs
+    assert "hip weak motors" not in truth(robot, COMBINED)
+
+
+def test_joints_that_differ_by_kind_are_read_by_kind() -> None:
+    """With motors alike the estimates of each kind are its own; with others a remark says so."""
+    alike = explain(simulate_learning(dataclasses.replace(LEGS, torque_constant=0.9)), draws=20)
+    table = alike.table()
+    for kind in ("armature", "damping", "Coulomb"):
+        for joint in ("thigh", "calf"):
+            row = table.loc[f"{joint} {kind}"]
+            assert row["estimate"] == pytest.approx(row["true"], rel=0.1)
+    assert not [line for line in remarks(alike) if "motors are not all" in line]
+    strides = simulate_learning(LEGS)
+    differ = explain(strides, draws=2)
+    said = next(line for line in remarks(differ) if "motors are not all as weak" in line)
+    assert "0.000 in the hips, 0.050 in the thighs, 0.100 in the calfs" in said
+
+
 def test_an_mjcf_that_is_gone_or_changed_leaves_the_truth_of_the_motors(
     robot: Robot, tmp_path: Path, learned_strides: xr.Dataset
 ) -> None:

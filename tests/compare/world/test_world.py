@@ -11,10 +11,11 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin._typing import Array
-from pronk_pin.compare import Scenario, World, build_model, load_scenario
+from pronk_pin.compare import Experiment, Scenario, World, build_model, load_scenario
 from pronk_pin.compare.world import finite, without_warnings
 from pronk_pin.control import Gains, load_controller
 from pronk_pin.dynamics import mass_matrix, nonlinear_effects
+from pronk_pin.errors import InvalidInput
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.parity import compare_models
 from pronk_pin.robot import ROBOTS, Robot, load_robot
@@ -215,6 +216,56 @@ def test_rotor_and_friction_come_on_top_of_the_robots_own(name: str) -> None:
     np.testing.assert_allclose(model.dof_armature[dofs], own.armature[6:] + 0.02)
     np.testing.assert_allclose(model.dof_damping[dofs], own.damping[6:] + 0.3)
     np.testing.assert_allclose(model.dof_frictionloss[dofs], own.friction[6:] + 0.4)
+
+
+BY_KIND = {
+    "armature": (0.01, 0.02, 0.03),
+    "damping": (0.1, 0.2, 0.3),
+    "coulomb": (0.3, 0.2, 0.1),
+    "torque_constant": (1.0, 0.9, 0.8),
+}
+
+
+@pytest.mark.parametrize("servo", [None, Gains()], ids=["motors", "servos"])
+@pytest.mark.parametrize("by_joint", [False, True])
+def test_joints_may_differ_by_kind_or_each(
+    robot: Robot, by_joint: bool, servo: Gains | None
+) -> None:
+    tiled = {name: np.tile(values, 4) for name, values in BY_KIND.items()}
+    if by_joint:
+        tiled = {name: values * np.linspace(1.0, 2.0, 12) for name, values in tiled.items()}
+    scenario = replace(IDEAL, name="mine", **(tiled if by_joint else BY_KIND))  # type: ignore[arg-type]
+    model = build_model(robot, scenario, servo=servo)
+    dofs = [model.joint(joint).dofadr[0] for joint in robot.joint_names]
+    motors = [model.actuator(joint).id for joint in robot.joint_names]
+    found = {
+        "armature": model.dof_armature[dofs] - robot.model.armature[6:],
+        "damping": model.dof_damping[dofs] - robot.model.damping[6:],
+        "coulomb": model.dof_frictionloss[dofs] - robot.model.friction[6:],
+        "torque_constant": model.actuator_gainprm[motors, 0],
+    }
+    for name, values in found.items():
+        np.testing.assert_allclose(values, tiled[name], atol=1e-15)
+        np.testing.assert_array_equal(scenario.by_joint(name, robot), tiled[name])
+    if servo is not None:
+        limit = robot.tau_max * tiled["torque_constant"]
+        np.testing.assert_allclose(model.actuator_forcerange[motors, 1], limit)
+        stiffness = servo.proportional * tiled["torque_constant"]
+        np.testing.assert_allclose(model.actuator_biasprm[motors, 1], -stiffness)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 4, 13])
+def test_values_of_another_number_of_joints_are_refused_with_the_remedy(
+    robot: Robot, count: int
+) -> None:
+    scenario = replace(IDEAL, name="mine", coulomb=(0.1,) * count)
+    words = (
+        rf"'mine': coulomb has {count} values; for the a1 give one number, 3 \(hip, thigh, calf\)"
+    )
+    with pytest.raises(InvalidInput, match=words):
+        build_model(robot, scenario)
+    with pytest.raises(InvalidInput, match=words + ", or 12, one for each joint"):
+        Experiment(scenarios=(scenario,))
 
 
 def test_viscous_friction_slows_the_joints_as_pinocchio_says(robot: Robot) -> None:
