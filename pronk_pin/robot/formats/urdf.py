@@ -44,6 +44,9 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
         raise _refused(robot, error) from error
     try:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+        inferred = spec.compiler.inertiafromgeom
+        # A shape without an inertial has no mass; MuJoCo would take it for one of water.
+        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
         model = spec.compile()
     except Exception as error:
         raise _refused(robot, error) from error
@@ -52,7 +55,8 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
         # were fused with others have it already, the rest as the URDF's full matrix.
         compiled = model.body(body.name)
         body.inertia, body.iquat = compiled.inertia, compiled.iquat
-        body.fullinertia = np.full(6, np.nan)
+        body.fullinertia, body.explicitinertial = np.full(6, np.nan), True
+    spec.compiler.inertiafromgeom = inferred  # for what a scenario may put beside the robot
     # The trunk may hang from a root link by a fixed joint; fused, it goes by the root's name.
     spec.body(base).name = robot.spec.base_link
     return spec
@@ -102,37 +106,59 @@ class _Joint:
 
 
 def _merge_impossible_inertias(root: ElementTree.Element) -> None:
-    """Move inertias that MuJoCo refuses into the parent link of their fixed joint.
+    """Move inertias that MuJoCo refuses or leaves out to a link at the other end of a fixed joint.
 
     The base of the Go1 weighs a milligram and has an inertia without three positive principal
-    moments. Fused with the trunk, as both engines do with fixed joints, it harms nothing, but
-    MuJoCo looks at each link before it fuses them.
+    moments; Bolt's feet have an inertia and no mass. Fused with the trunk or the shank, as both
+    engines do with fixed joints, they harm nothing, but MuJoCo looks at each link before it fuses
+    them.
     """
     links = {link.get("name", ""): link for link in root.findall("link")}
     fixed = [joint for joint in map(_Joint, root.findall("joint")) if joint.fixed]
-    for name, link in links.items():
-        inertia = link_inertia(link)
+    bearing = {joint.child: joint for joint in fixed}
+
+    def depth(name: str) -> int:
+        return 1 + depth(bearing[name].parent) if name in bearing else 0
+
+    cause: dict[str, str] = {}
+    for name in sorted(links, key=depth, reverse=True):  # what hangs from others comes first
+        inertia = link_inertia(links[name])
         if inertia is None or _is_possible(inertia):
             continue
-        up = next((joint for joint in fixed if joint.child == name), None)
-        down = next((joint for joint in fixed if joint.parent == name), None)
-        if up is not None:
-            neighbour, moved = links[up.parent], up.placement.act(inertia)
-        elif down is not None:
-            neighbour, moved = links[down.child], down.placement.actInv(inertia)
-        else:
-            continue  # a link that moves by itself: MuJoCo's complaint names it
-        other = link_inertia(neighbour)
-        set_link_inertia(neighbour, moved if other is None else moved + other)
-        set_link_inertia(link, None)
+        if name in bearing:
+            up = bearing[name]
+            _move(links[name], links[up.parent], up.placement.act(inertia))
+            cause.setdefault(up.parent, cause.get(name, name))
+            continue
+        for down in (joint for joint in fixed if joint.parent == name):
+            inertia = _move(links[name], links[down.child], down.placement.actInv(inertia))
+            if _is_possible(inertia):
+                break
+            inertia = down.placement.act(inertia)
+            _move(links[down.child], links[name], inertia)
+        if not _is_possible(inertia, tolerance=1e-9):
+            raise InvalidInput(
+                f"link {cause.get(name, name)}: its mass and inertia are none that a body can have"
+            )
 
 
-def _is_possible(inertia: pin.Inertia) -> bool:
-    """Whether MuJoCo accepts an inertia: no mass at all, or moments that a body can have."""
-    if inertia.mass == 0.0 and not np.any(inertia.inertia):
-        return True
-    moments = np.linalg.eigvalsh(inertia.inertia)  # ascending
-    return bool(moments[0] > 1e-14 and moments[0] + moments[1] >= moments[2])
+def _move(
+    link: ElementTree.Element, neighbour: ElementTree.Element, moved: pin.Inertia
+) -> pin.Inertia:
+    """Give a link's inertia to a neighbour, in whose frame it is; returns what that has then."""
+    other = link_inertia(neighbour)
+    whole = moved if other is None else moved + other
+    set_link_inertia(neighbour, whole)
+    set_link_inertia(link, None)
+    return whole
+
+
+def _is_possible(inertia: pin.Inertia, *, tolerance: float = 0.0) -> bool:
+    """Whether MuJoCo takes an inertia as it is: none at all, or one that a body can have."""
+    if inertia.mass == 0.0:
+        return not np.any(inertia.inertia)
+    low, middle, high = np.linalg.eigvalsh(inertia.inertia)  # ascending
+    return bool(low > 1e-14 and low + middle >= high * (1.0 - tolerance))
 
 
 def body_inertia(body: mujoco.MjsBody) -> pin.Inertia:
