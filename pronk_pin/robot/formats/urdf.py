@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from ..._typing import Array
 from ...errors import FileProblem, InvalidInput
 from ..robot import Robot
+from ..urdf_document import numbers_of, placement_of, release_base
 
 _WORLD = "pronk_pin_world"
 
@@ -38,6 +38,7 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     root = ElementTree.fromstring(robot.urdf)
     _drop_shapes(root, collisions=collisions)
     try:
+        release_base(root)
         base = _float_base(root)
         _merge_impossible_inertias(root)
     except InvalidInput as error:
@@ -56,6 +57,9 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
         compiled = model.body(body.name)
         body.inertia, body.iquat = compiled.inertia, compiled.iquat
         body.fullinertia, body.explicitinertial = np.full(6, np.nan), True
+    for name, low in zip(robot.joint_names, robot.q_min, strict=True):
+        if low == -np.inf:
+            spec.joint(name).limited = mujoco.mjtLimited.mjLIMITED_FALSE
     spec.compiler.inertiafromgeom = inferred  # for what a scenario may put beside the robot
     # The trunk may hang from a root link by a fixed joint; fused, it goes by the root's name.
     spec.body(base).name = robot.spec.base_link
@@ -102,7 +106,7 @@ class _Joint:
         self.parent = "" if parent is None else parent.get("link", "")
         self.child = "" if child is None else child.get("link", "")
         self.fixed = element.get("type") == "fixed"
-        self.placement = _placement(element)
+        self.placement = placement_of(element)
 
 
 def _merge_impossible_inertias(root: ElementTree.Element) -> None:
@@ -188,14 +192,14 @@ def link_inertia(link: ElementTree.Element) -> pin.Inertia | None:
     if inertial is None or mass is None or moments is None:
         return None
     axes = ("xx", "xy", "xz", "yy", "yz", "zz")
-    xx, xy, xz, yy, yz, zz = (_numbers(moments, f"i{axis}", "0", 1)[0] for axis in axes)
+    xx, xy, xz, yy, yz, zz = (numbers_of(moments, f"i{axis}", "0", 1)[0] for axis in axes)
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    weight = float(_numbers(mass, "value", "0", 1)[0])
+    weight = float(numbers_of(mass, "value", "0", 1)[0])
     try:
         own = pin.Inertia(weight, np.zeros(3), matrix)
     except (ValueError, RuntimeError) as error:
         raise InvalidInput(f"link {link.get('name')}: {error}") from error
-    return _placement(inertial).act(own)
+    return placement_of(inertial).act(own)
 
 
 def set_link_inertia(link: ElementTree.Element, inertia: pin.Inertia | None) -> None:
@@ -213,28 +217,3 @@ def set_link_inertia(link: ElementTree.Element, inertia: pin.Inertia | None) -> 
         for column in range(row, 3)
     }
     ElementTree.SubElement(inertial, "inertia", moments)
-
-
-def _placement(element: ElementTree.Element) -> pin.SE3:
-    """The `origin` of an element; the identity where it has none."""
-    origin = element.find("origin")
-    if origin is None:
-        return pin.SE3.Identity()
-    xyz, rpy = (_numbers(origin, key, "0 0 0", 3) for key in ("xyz", "rpy"))
-    return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
-
-
-def _numbers(element: ElementTree.Element, key: str, default: str, count: int) -> Array:
-    """The numbers of an attribute, shape (count,).
-
-    Raises:
-        InvalidInput: There are others.
-    """
-    text = element.get(key, default)
-    try:
-        numbers = np.array([float(word) for word in text.split()])
-    except ValueError:
-        numbers = np.empty(0)
-    if len(numbers) != count or not np.all(np.isfinite(numbers)):
-        raise InvalidInput(f'<{element.tag} {key}="{text}">: give {count} finite number(s)')
-    return numbers
