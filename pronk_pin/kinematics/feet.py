@@ -217,8 +217,8 @@ def _in_range(angles: Array, low: Array, high: Array) -> tuple[Array, BoolArray]
     """Angles (..., 3) wrapped as near the middle of their range as can be; whether all
     are within it, shape (...)."""
     # The middle counts: the thigh of the A1 goes beyond pi.
-    middle = 0.5 * (low + high)
-    middle = np.where(np.isfinite(middle), middle, 0.0)
+    limited = np.isfinite(low) & np.isfinite(high)
+    middle = 0.5 * (np.where(limited, low, 0.0) + np.where(limited, high, 0.0))
     joints = (angles - middle + np.pi) % (2.0 * np.pi) - np.pi + middle
     inside = (joints >= low - _ROUND_OFF) & (joints <= high + _ROUND_OFF)
     return joints, np.asarray(inside.all(axis=-1))

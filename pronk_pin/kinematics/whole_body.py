@@ -18,6 +18,9 @@ from .contacts import jacobian_at
 _DAMPING = (1e-12, 1e-8, 1e-5, 1e-3, 1e-1, 10.0)
 """Dampings of a step that are tried in turn until one brings the targets nearer."""
 _ACCURACY = 1e-12
+_MOST_ITERATIONS = (1000, 50)
+"""Outer and inner iterations of the QP of a step, which takes about ten; contradictory limits would
+have it go on for minutes."""
 _STALLED = 1e-12
 """Relative decrease of the cost below which nothing more is to be gained."""
 
@@ -123,6 +126,7 @@ def _descend(
     """Iterate until the targets are reached or come no nearer."""
     qp = proxqp.dense.QP(robot.nv, 0, robot.nu)
     qp.settings.eps_abs, qp.settings.eps_rel = _ACCURACY, 0.0
+    qp.settings.max_iter, qp.settings.max_iter_in = _MOST_ITERATIONS
     errors, taken = task.errors(robot, q), 0
     while taken < iterations and not _reached(errors, tolerance):
         improved = _step(robot, task, q, errors, qp)

@@ -231,7 +231,7 @@ def _pinocchio_joint(
 
 
 def _finite_or_none(limit: Array) -> Array:
-    return np.where(np.abs(limit) > _HUGE, np.sign(limit) * np.inf, limit)
+    return np.where(np.abs(limit) > _HUGE, np.copysign(np.inf, limit), limit)
 
 
 class _Pinocchio:

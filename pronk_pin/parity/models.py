@@ -22,7 +22,7 @@ from .._checks import NOT_NEGATIVE, Interval, instance_of, none_or, real, whole
 from .._typing import Array
 from ..errors import FileProblem, InvalidInput
 from ..robot import Robot, read_urdf
-from ..robot.formats import compile_mjcf, read_mjcf
+from ..robot.formats import compile_mjcf, drop_looks, read_mjcf
 from ..storage import from_text, read_xml
 from .mechanism import FLOATING, Mechanism, Point, State, read_pinocchio
 from .mechanism_mujoco import read_mujoco
@@ -330,6 +330,7 @@ def _read_file(path: Path) -> Mechanism:
         )
     spec = read_mjcf(path)
     six_digits = _has_six_digits(spec)
+    drop_looks(spec)
     compiled = compile_mjcf(spec, path, "correct what it names")
     return read_mujoco(compiled, f"{path} (MuJoCo)", round_off=SIX_DIGITS if six_digits else 0.0)
 

@@ -28,13 +28,14 @@ from ..errors import InvalidInput
 from ..storage import from_text
 from .parameters import BY_JOINT, NOTHING, SLIDING, ModelParameters, loaded
 from .robot_spec import (
+    CENTRE,
     JOINTS,
     ROBOTS,
     RobotSpec,
     check_names,
     load_robot_spec,
     locate,
-    read_foot_radius,
+    place_feet,
 )
 from .urdf_file import read_urdf
 
@@ -142,13 +143,18 @@ class Robot(Displayed):
 
     @property
     def foot_names(self) -> tuple[str, ...]:
-        """Frames of the feet, in the order of the legs."""
+        """Links of the feet, in the order of the legs."""
         return self.spec.foot_names
 
     @cached_property
     def foot_ids(self) -> tuple[int, ...]:
-        """Pinocchio's frame ids of the feet."""
-        return tuple(int(self.model.getFrameId(name)) for name in self.foot_names)
+        """Pinocchio's frame ids of the feet's centres."""
+        centres = [name + CENTRE for name in self.foot_names]
+        names = zip(centres, self.foot_names, strict=True)
+        return tuple(
+            int(self.model.getFrameId(centre if self.model.existFrame(centre) else name))
+            for centre, name in names
+        )
 
     @cached_property
     def data(self) -> pin.Data:
@@ -347,7 +353,7 @@ def _load(spec: RobotSpec) -> Robot:
     data, document, model = read_urdf(path)
     model.name = spec.name
     check_names(spec, model, path)
-    radius = read_foot_radius(document, spec) if spec.foot_radius is None else spec.foot_radius
+    radius = place_feet(spec, document, model)
     order = [element.get("name", "") for element in document.findall("joint")]
     joints = set(model.names[2:])
     return Robot(

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import importlib.metadata
-import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pinocchio as pin
 
 from .._checks import Interval, file_name, none_or, real, reals, sequence_of, text
@@ -15,6 +15,7 @@ from .._checks import path as known_path
 from .._registry import find
 from ..errors import FileProblem, InvalidInput
 from ..storage import as_type, check_file, read_toml
+from .urdf_document import numbers_of, placement_of
 
 JOINTS = ("hip", "thigh", "calf")
 """Joints of a leg, from the trunk down; a `RobotSpec` says what a URDF calls them."""
@@ -29,6 +30,9 @@ _OF_A_LEG = {
     "kd": Interval(0, 1e4, "N m s/rad"),
 }
 """Fields with one value for each joint of a leg, and what the values can be."""
+
+CENTRE = " (centre)"
+"""Ending of the names of frames at the centres of feet that are not at their link's origin."""
 
 _DATA_DISTRIBUTION = "example-robot-data"
 
@@ -48,8 +52,8 @@ class RobotSpec:
         foot_pattern: Name of the foot's frame, with `{leg}`.
         standing: Joint angles of the standing posture [rad]: of one leg, the same for each, or of
             all legs one after the other.
-        foot_radius: Radius of the spherical feet [m]; None to read it from the collision sphere
-            in the URDF.
+        foot_radius: Radius of the spherical feet [m]; None to read it from the collision spheres
+            in the URDF. Where these are in the foot's link, too, is read from there.
         rotors: Rotor inertia of a leg's joints as they feel it, through the gear [kg m^2], from the
             motors' datasheet; one for each of `joints`, or none where it is not known. The URDF's
             model is without it; controllers that know it say so.
@@ -193,42 +197,67 @@ def check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:
             f"{path.name}: its joints are {', '.join(joints)}; the specification expects "
             f"{', '.join(spec.joint_names)}; adapt joints, joint_pattern and legs of the RobotSpec"
         )
-    for name, joint in zip(joints, model.joints[2:], strict=True):
-        if joint.nq != 1:
-            raise InvalidInput(
-                f"{path.name}: joint {name} has no limits ({joint.shortname()}), so Pinocchio "
-                "writes its angle as a cosine and a sine; make it a revolute joint with limits"
-            )
-    for name in spec.foot_names:
+    for leg, name in zip(spec.legs, spec.foot_names, strict=True):
         if not model.existFrame(name):
             raise InvalidInput(f"{path.name} has no frame {name}; adapt foot_pattern")
+        mover = model.names[model.frames[model.getFrameId(name)].parentJoint]
+        if mover != spec.leg_joints(leg)[-1]:
+            raise InvalidInput(
+                f"{path.name}: foot {name} is moved by joint {mover}, and not by "
+                f"{spec.leg_joints(leg)[-1]}, the last of its leg; adapt joints or foot_pattern"
+            )
     if not model.existFrame(spec.base_link):
         raise InvalidInput(f"{path.name} has no link {spec.base_link}; adapt base_link")
+    mover = model.names[model.frames[model.getFrameId(spec.base_link)].parentJoint]
+    if mover in joints:
+        raise InvalidInput(
+            f"{path.name}: link {spec.base_link} is moved by joint {mover}; adapt base_link, which "
+            "is the link that floats"
+        )
 
 
-def read_foot_radius(document: ElementTree.Element, spec: RobotSpec) -> float:
-    """Radius of the first foot's collision sphere [m].
+def place_feet(spec: RobotSpec, document: ElementTree.Element, model: pin.Model) -> float:
+    """Give the model a frame at the centre of each foot's collision sphere; the spheres' radius.
+
+    Where a sphere is about the origin of its link there is a frame already. A foot that has none,
+    or several, is about the origin of its link, with the radius of the specification [m].
 
     Raises:
-        InvalidInput: It has none, or one without a radius.
+        InvalidInput: There is no such radius, or the feet have not all the same.
     """
-    foot = spec.foot_names[0]
-    sphere = document.find(f"./link[@name='{foot}']/collision/geometry/sphere")
-    if sphere is None:
+    radii = []
+    for foot in spec.foot_names:
+        spheres = [
+            (shape, sphere)
+            for shape in document.findall(f"./link[@name='{foot}']/collision")
+            for sphere in shape.findall("geometry/sphere")
+        ]
+        if len(spheres) != 1:
+            if spec.foot_radius is not None:
+                continue
+            raise InvalidInput(
+                f"{spec.name}: foot {foot} has {len(spheres) or 'no'} collision sphere"
+                f"{'s' * bool(spheres)}; give foot_radius in the RobotSpec"
+            )
+        shape, sphere = spheres[0]
+        radii.append(float(numbers_of(sphere, "radius", None, 1)[0]))
+        centre = placement_of(shape).translation
+        if np.any(centre):
+            parent = model.getFrameId(foot)
+            joint, place = model.frames[parent].parentJoint, model.frames[parent].placement
+            place = place * pin.SE3(np.eye(3), centre)
+            model.addFrame(
+                pin.Frame(foot + CENTRE, joint, parent, place, pin.FrameType.OP_FRAME), False
+            )
+    if spec.foot_radius is not None:
+        return spec.foot_radius
+    if max(radii) > min(radii) * (1.0 + 1e-9):
         raise InvalidInput(
-            f"{spec.name}: foot {foot} has no collision sphere; give foot_radius in the RobotSpec"
+            f"{spec.name}: the feet's collision spheres have the radii "
+            f"{', '.join(f'{radius:g}' for radius in radii)} m; give them one, or foot_radius in "
+            "the RobotSpec"
         )
-    text = sphere.get("radius", "")
-    try:
-        radius = float(text)
-    except ValueError:
-        radius = math.nan
-    if not 0.0 < radius < math.inf:
-        raise InvalidInput(
-            f"{spec.name}: the collision sphere of foot {foot} has the radius '{text}'; give a "
-            "length in metres"
-        )
-    return radius
+    return radii[0]
 
 
 def locate(urdf: str) -> tuple[Path, Path]:

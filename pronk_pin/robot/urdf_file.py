@@ -7,14 +7,22 @@ import os
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from ..errors import FileProblem
+from ..errors import FileProblem, InvalidInput
 from ..storage import LARGEST_DOCUMENT, damaged, parse_xml, read_bytes, refuse_nan
+from .urdf_document import (
+    check_document,
+    declared_mass,
+    endless_joints,
+    is_xacro,
+    release_base,
+)
 
 _CHECK = "check the file"
 
@@ -27,7 +35,7 @@ class Urdf(NamedTuple):
 
     Attributes:
         data: The bytes of the file.
-        root: The document.
+        root: The document, without a root link to which the base is tied by a floating joint.
         model: Pinocchio's model with a floating base.
     """
 
@@ -43,12 +51,27 @@ def read_urdf(path: Path) -> Urdf:
         FileProblem: It cannot be read, is none, or has numbers that are none of a robot.
     """
     data = read_bytes(path, _CHECK, limit=LARGEST_DOCUMENT)
-    root = parse_xml(data, path, _CHECK, what="URDF")
+    try:
+        root = parse_xml(data, path, _CHECK, what="URDF")
+    except FileProblem as error:
+        if b"<xacro:" in data:  # a prefix that nothing declares
+            raise _xacro(path) from error
+        raise
+    if is_xacro(root):
+        raise _xacro(path)
     refuse_nan(root, path, _CHECK, what="URDF")  # a mass of NaN is taken for none
+    try:
+        released = release_base(root)
+        check_document(root)
+    except InvalidInput as error:
+        raise FileProblem(path, f"not a usable URDF ({error})", _CHECK) from error
     said: list[str] = []
     try:
         # What Pinocchio calls reads UTF-8 only.
         text = data.decode()
+        endless = endless_joints(root)
+        if released or any(joint.get("type") == "continuous" for joint in endless):
+            text = _with_angles(root)
         with _overheard(said):
             model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
         if said:  # it goes on without the link's inertia, say
@@ -56,8 +79,43 @@ def read_urdf(path: Path) -> Urdf:
     except Exception as error:
         reason = " ".join([*said[:1], *str(error).split()])[:500]
         raise FileProblem(path, f"not a usable URDF ({reason})", _CHECK) from error
+    for joint in endless:
+        _set_endless(model, joint)
     _check_numbers(path, model)
+    declared, loaded = declared_mass(root), pin.computeTotalMass(model)
+    if abs(loaded - declared) > 1e-9 * declared:
+        reason = f"its links weigh {declared:.6g} kg, of which Pinocchio reads {loaded:.6g}"
+        raise damaged(path, reason, _CHECK, what="URDF")
     return Urdf(data, root, model)
+
+
+def _xacro(path: Path) -> FileProblem:
+    expanded = path.name.removesuffix(".xacro").removesuffix(".urdf") + "_expanded.urdf"
+    return FileProblem(
+        path,
+        "this is xacro, of which a URDF is made",
+        f"run 'xacro {path.name} > {expanded}' (of ROS, or of 'pip install xacro'), and give that",
+    )
+
+
+def _with_angles(root: ElementTree.Element) -> str:
+    """The document with continuous joints as revolute ones, so that q has an angle for each."""
+    copy = deepcopy(root)
+    for joint in copy.findall("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            if limit is None:
+                ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
+    return ElementTree.tostring(copy, encoding="unicode")
+
+
+def _set_endless(model: pin.Model, joint: ElementTree.Element) -> None:
+    """Take away the limits that a joint has not."""
+    own = model.joints[model.getJointId(joint.get("name", ""))]
+    model.lowerPositionLimit[own.idx_q], model.upperPositionLimit[own.idx_q] = -np.inf, np.inf
+    if joint.find("limit") is None:
+        model.effortLimit[own.idx_v] = model.velocityLimit[own.idx_v] = np.inf
 
 
 @contextlib.contextmanager

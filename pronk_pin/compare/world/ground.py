@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 from scipy.ndimage import gaussian_filter
 
 from ..._typing import Array
+from ...errors import InvalidInput
 from ...robot import Robot
 from .scenario import Scenario
 
@@ -28,6 +30,9 @@ _PERIOD = 10.0
 """Distance along the way after which they repeat [m]."""
 _ROUGH_LENGTH, _ROUGH_WIDTH = 100.0, 2.5
 """Half the length and half the width of rough ground [m]; beyond it is level, at its lowest."""
+
+_AS_LOW = 1e-4
+"""Height above a standing foot's lowest point within which other shapes bear weight, too [m]."""
 
 
 def add_ground(spec: mujoco.MjSpec, robot: Robot, scenario: Scenario) -> None:
@@ -121,19 +126,86 @@ def _add_heights(spec: mujoco.MjSpec, heights: Array) -> mujoco.MjsGeom:
 
 
 def name_feet(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """The sphere that each foot stands on; one of our own where the robot has a mesh instead.
+    """Name the sphere that each foot stands on; one of our own where the robot has a mesh instead.
+
+    It is sought in all that is welded to the last link of a leg, about where the robot's foot is.
 
     Args:
         spec: The robot, with its joints named as `robot.joint_names`.
         robot: The robot.
+
+    Raises:
+        InvalidInput: The robot would not stand on it, as something else of that link is as low.
     """
-    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    for leg, foot, foot_id in zip(robot.legs, robot.foot_names, robot.foot_ids, strict=True):
-        calf = spec.joint(robot.spec.leg_joints(leg)[-1]).parent
-        centre = np.array(robot.model.frames[foot_id].placement.translation)
-        spheres = [geom for geom in calf.geoms if geom.type == sphere]
-        if spheres:
-            geom = min(spheres, key=lambda each: float(np.linalg.norm(each.pos - centre)))
+    model = spec.compile()
+    zero, stands = (
+        _posed(model, robot, angles) for angles in (np.zeros(robot.nu), robot.standing[-robot.nu :])
+    )
+    axes = zero.xmat[model.body(robot.spec.base_link).id].reshape(3, 3)
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    bearer = model.body_weldid[model.geom_bodyid]
+    for leg, foot, centre in zip(robot.legs, robot.foot_names, _foot_centres(robot), strict=True):
+        joint = model.joint(robot.spec.leg_joints(leg)[-1])
+        calf = int(joint.bodyid[0])
+        shapes = np.flatnonzero(solid & (bearer == calf))
+        spheres = shapes[model.geom_type[shapes] == mujoco.mjtGeom.mjGEOM_SPHERE]
+        place = zero.xanchor[joint.id] - zero.xpos[calf] + axes @ centre  # from the calf's origin
+        apart = np.linalg.norm(zero.geom_xpos[spheres] - zero.xpos[calf] - place, axis=1)
+        # One that is farther from the foot than half the link is of a knee, say.
+        near = spheres[apart <= max(robot.foot_radius, 0.5 * float(np.linalg.norm(centre)))]
+        in_calf = zero.xmat[calf].reshape(3, 3).T @ place
+        if len(near):
+            index = int(near[np.argmin(apart[np.isin(spheres, near)])])
+            geom = next(each for each in spec.geoms if each.id == index)
+            lowest = stands.geom_xpos[index, 2] - model.geom_size[index, 0]
+            shapes = shapes[shapes != index]
         else:
-            geom = calf.add_geom(type=sphere, pos=centre, size=[robot.foot_radius, 0, 0], mass=0)
+            geom = spec.joint(joint.name).parent.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_SPHERE,
+                pos=in_calf,
+                size=[robot.foot_radius, 0, 0],
+                mass=0,
+            )
+            height = stands.xpos[calf, 2] + stands.xmat[calf].reshape(3, 3)[2] @ in_calf
+            lowest = height - robot.foot_radius
+        for other in spec.geoms:
+            other.name = "" if other.name == foot else other.name
         geom.name = foot
+        other_low = min((_bottom(model, stands, int(other)) for other in shapes), default=np.inf)
+        if other_low <= lowest + _AS_LOW:
+            raise InvalidInput(
+                f"{robot.name} would not stand on the sphere of foot {foot} alone: another shape "
+                f"of its link is {1e3 * (lowest - other_low):.1f} mm lower; take that away, or "
+                "correct foot_pattern, foot_radius or standing of the RobotSpec"
+            )
+
+
+def _posed(model: mujoco.MjModel, robot: Robot, angles: Array) -> mujoco.MjData:
+    """The robot with its trunk level and its joints at some angles, shape (12,)."""
+    data = mujoco.MjData(model)
+    for name, angle in zip(robot.joint_names, angles, strict=True):
+        data.qpos[model.joint(name).qposadr[0]] = angle
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def _foot_centres(robot: Robot) -> list[Array]:
+    """Centres of the feet from the joints that move them, in the trunk's axes at zero angles."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
+    frames = [robot.model.frames[foot] for foot in robot.foot_ids]
+    return [data.oMi[frame.parentJoint].rotation @ frame.placement.translation for frame in frames]
+
+
+def _bottom(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
+    """Height of the lowest point of a shape [m]."""
+    down = data.geom_xmat[geom].reshape(3, 3)[2]  # the vertical, in the shape's axes
+    x, y, z = model.geom_size[geom]
+    half = {
+        mujoco.mjtGeom.mjGEOM_SPHERE: x,
+        mujoco.mjtGeom.mjGEOM_CAPSULE: x + y * abs(down[2]),
+        mujoco.mjtGeom.mjGEOM_CYLINDER: x * np.hypot(down[0], down[1]) + y * abs(down[2]),
+        mujoco.mjtGeom.mjGEOM_ELLIPSOID: np.linalg.norm(down * [x, y, z]),
+        mujoco.mjtGeom.mjGEOM_BOX: np.abs(down) @ [x, y, z],
+    }.get(mujoco.mjtGeom(model.geom_type[geom]), model.geom_rbound[geom])
+    return float(data.geom_xpos[geom, 2] - half)

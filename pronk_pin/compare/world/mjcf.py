@@ -21,7 +21,7 @@ from ..._checks import path as known_path
 from ...errors import InvalidInput
 from ...parity import SIX_DIGITS, Parity, compare_models
 from ...robot import Robot, as_robot
-from ...robot.formats import check_mjcf, compile_mjcf, loading, read_mjcf
+from ...robot.formats import check_mjcf, compile_mjcf, drop_looks, loading, read_mjcf
 from ...storage import from_text, read_bytes, sha256
 
 _FREE, _HINGE = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_HINGE
@@ -50,8 +50,7 @@ def mjcf_spec(robot: Robot, path: Path | str, *, actuators: bool = False) -> muj
     _keep_the_robot(spec, trunk)
     for actuator in [] if actuators else spec.actuators:
         spec.delete(actuator)
-    if all(body.explicitinertial or not body.geoms for body in _links(spec)):
-        _drop_shapes(spec)
+    drop_looks(spec)
     trunk.name = robot.spec.base_link
     trunk.pos, trunk.quat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
     for joint in trunk.joints:  # which may have inherited friction that was meant for the legs

@@ -4,7 +4,7 @@ Comes in: a `Robot`.
 Goes out: its MuJoCo specification, and files: MJCF and URDF.
 """
 
-from .mjcf_file import check_mjcf, compile_mjcf, loading, read_mjcf
+from .mjcf_file import check_mjcf, compile_mjcf, drop_looks, loading, read_mjcf
 from .model_files import write_mjcf, write_urdf
 from .urdf import body_inertia, mujoco_spec, set_body_inertia
 
@@ -12,6 +12,7 @@ __all__ = [
     "body_inertia",
     "check_mjcf",
     "compile_mjcf",
+    "drop_looks",
     "loading",
     "mujoco_spec",
     "read_mjcf",

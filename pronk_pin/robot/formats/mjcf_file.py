@@ -75,6 +75,28 @@ def compile_mjcf(spec: mujoco.MjSpec, path: Path, remedy: str = _GIVE) -> mujoco
     return model
 
 
+def drop_looks(spec: mujoco.MjSpec) -> None:
+    """Delete meshes that have no part in an inertia, and what colours them: they may be missing."""
+    used = set()
+    inferred = spec.compiler.inertiafromgeom
+    for geom in spec.geoms:
+        geom.material = ""
+        if geom.type not in (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF):
+            continue
+        weightless = geom.mass == 0.0 or (np.isnan(geom.mass) and geom.density == 0.0)
+        given = inferred == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE or (
+            inferred == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+            and geom.parent.explicitinertial
+        )
+        if weightless or given or geom.parent.name == "world":
+            spec.delete(geom)
+        else:
+            used.add(geom.meshname)
+    meshes = [mesh for mesh in spec.meshes if mesh.name not in used]
+    for element in (*meshes, *spec.materials, *spec.textures, *spec.skins):
+        spec.delete(element)
+
+
 @contextlib.contextmanager
 def loading(path: Path, remedy: str = _GIVE) -> Iterator[None]:
     """Around calls of MuJoCo, which names what it cannot load in errors of many kinds.

@@ -13,9 +13,9 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from ..._typing import Array
 from ...errors import FileProblem, InvalidInput
 from ..robot import Robot
+from ..urdf_document import numbers_of, placement_of, release_base
 
 _WORLD = "pronk_pin_world"
 
@@ -38,12 +38,16 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     root = ElementTree.fromstring(robot.urdf)
     _drop_shapes(root, collisions=collisions)
     try:
+        release_base(root)
         base = _float_base(root)
         _merge_impossible_inertias(root)
     except InvalidInput as error:
         raise _refused(robot, error) from error
     try:
         spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+        inferred = spec.compiler.inertiafromgeom
+        # A shape without an inertial has no mass; MuJoCo would take it for one of water.
+        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
         model = spec.compile()
     except Exception as error:
         raise _refused(robot, error) from error
@@ -52,7 +56,11 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
         # were fused with others have it already, the rest as the URDF's full matrix.
         compiled = model.body(body.name)
         body.inertia, body.iquat = compiled.inertia, compiled.iquat
-        body.fullinertia = np.full(6, np.nan)
+        body.fullinertia, body.explicitinertial = np.full(6, np.nan), True
+    for name, low in zip(robot.joint_names, robot.q_min, strict=True):
+        if low == -np.inf:
+            spec.joint(name).limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    spec.compiler.inertiafromgeom = inferred  # for what a scenario may put beside the robot
     # The trunk may hang from a root link by a fixed joint; fused, it goes by the root's name.
     spec.body(base).name = robot.spec.base_link
     return spec
@@ -98,41 +106,63 @@ class _Joint:
         self.parent = "" if parent is None else parent.get("link", "")
         self.child = "" if child is None else child.get("link", "")
         self.fixed = element.get("type") == "fixed"
-        self.placement = _placement(element)
+        self.placement = placement_of(element)
 
 
 def _merge_impossible_inertias(root: ElementTree.Element) -> None:
-    """Move inertias that MuJoCo refuses into the parent link of their fixed joint.
+    """Move inertias that MuJoCo refuses or leaves out to a link at the other end of a fixed joint.
 
     The base of the Go1 weighs a milligram and has an inertia without three positive principal
-    moments. Fused with the trunk, as both engines do with fixed joints, it harms nothing, but
-    MuJoCo looks at each link before it fuses them.
+    moments; Bolt's feet have an inertia and no mass. Fused with the trunk or the shank, as both
+    engines do with fixed joints, they harm nothing, but MuJoCo looks at each link before it fuses
+    them.
     """
     links = {link.get("name", ""): link for link in root.findall("link")}
     fixed = [joint for joint in map(_Joint, root.findall("joint")) if joint.fixed]
-    for name, link in links.items():
-        inertia = link_inertia(link)
+    bearing = {joint.child: joint for joint in fixed}
+
+    def depth(name: str) -> int:
+        return 1 + depth(bearing[name].parent) if name in bearing else 0
+
+    cause: dict[str, str] = {}
+    for name in sorted(links, key=depth, reverse=True):  # what hangs from others comes first
+        inertia = link_inertia(links[name])
         if inertia is None or _is_possible(inertia):
             continue
-        up = next((joint for joint in fixed if joint.child == name), None)
-        down = next((joint for joint in fixed if joint.parent == name), None)
-        if up is not None:
-            neighbour, moved = links[up.parent], up.placement.act(inertia)
-        elif down is not None:
-            neighbour, moved = links[down.child], down.placement.actInv(inertia)
-        else:
-            continue  # a link that moves by itself: MuJoCo's complaint names it
-        other = link_inertia(neighbour)
-        set_link_inertia(neighbour, moved if other is None else moved + other)
-        set_link_inertia(link, None)
+        if name in bearing:
+            up = bearing[name]
+            _move(links[name], links[up.parent], up.placement.act(inertia))
+            cause.setdefault(up.parent, cause.get(name, name))
+            continue
+        for down in (joint for joint in fixed if joint.parent == name):
+            inertia = _move(links[name], links[down.child], down.placement.actInv(inertia))
+            if _is_possible(inertia):
+                break
+            inertia = down.placement.act(inertia)
+            _move(links[down.child], links[name], inertia)
+        if not _is_possible(inertia, tolerance=1e-9):
+            raise InvalidInput(
+                f"link {cause.get(name, name)}: its mass and inertia are none that a body can have"
+            )
 
 
-def _is_possible(inertia: pin.Inertia) -> bool:
-    """Whether MuJoCo accepts an inertia: no mass at all, or moments that a body can have."""
-    if inertia.mass == 0.0 and not np.any(inertia.inertia):
-        return True
-    moments = np.linalg.eigvalsh(inertia.inertia)  # ascending
-    return bool(moments[0] > 1e-14 and moments[0] + moments[1] >= moments[2])
+def _move(
+    link: ElementTree.Element, neighbour: ElementTree.Element, moved: pin.Inertia
+) -> pin.Inertia:
+    """Give a link's inertia to a neighbour, in whose frame it is; returns what that has then."""
+    other = link_inertia(neighbour)
+    whole = moved if other is None else moved + other
+    set_link_inertia(neighbour, whole)
+    set_link_inertia(link, None)
+    return whole
+
+
+def _is_possible(inertia: pin.Inertia, *, tolerance: float = 0.0) -> bool:
+    """Whether MuJoCo takes an inertia as it is: none at all, or one that a body can have."""
+    if inertia.mass == 0.0:
+        return not np.any(inertia.inertia)
+    low, middle, high = np.linalg.eigvalsh(inertia.inertia)  # ascending
+    return bool(low > 1e-14 and low + middle >= high * (1.0 - tolerance))
 
 
 def body_inertia(body: mujoco.MjsBody) -> pin.Inertia:
@@ -162,14 +192,14 @@ def link_inertia(link: ElementTree.Element) -> pin.Inertia | None:
     if inertial is None or mass is None or moments is None:
         return None
     axes = ("xx", "xy", "xz", "yy", "yz", "zz")
-    xx, xy, xz, yy, yz, zz = (_numbers(moments, f"i{axis}", "0", 1)[0] for axis in axes)
+    xx, xy, xz, yy, yz, zz = (numbers_of(moments, f"i{axis}", "0", 1)[0] for axis in axes)
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    weight = float(_numbers(mass, "value", "0", 1)[0])
+    weight = float(numbers_of(mass, "value", "0", 1)[0])
     try:
         own = pin.Inertia(weight, np.zeros(3), matrix)
     except (ValueError, RuntimeError) as error:
         raise InvalidInput(f"link {link.get('name')}: {error}") from error
-    return _placement(inertial).act(own)
+    return placement_of(inertial).act(own)
 
 
 def set_link_inertia(link: ElementTree.Element, inertia: pin.Inertia | None) -> None:
@@ -187,28 +217,3 @@ def set_link_inertia(link: ElementTree.Element, inertia: pin.Inertia | None) -> 
         for column in range(row, 3)
     }
     ElementTree.SubElement(inertial, "inertia", moments)
-
-
-def _placement(element: ElementTree.Element) -> pin.SE3:
-    """The `origin` of an element; the identity where it has none."""
-    origin = element.find("origin")
-    if origin is None:
-        return pin.SE3.Identity()
-    xyz, rpy = (_numbers(origin, key, "0 0 0", 3) for key in ("xyz", "rpy"))
-    return pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz)
-
-
-def _numbers(element: ElementTree.Element, key: str, default: str, count: int) -> Array:
-    """The numbers of an attribute, shape (count,).
-
-    Raises:
-        InvalidInput: There are others.
-    """
-    text = element.get(key, default)
-    try:
-        numbers = np.array([float(word) for word in text.split()])
-    except ValueError:
-        numbers = np.empty(0)
-    if len(numbers) != count or not np.all(np.isfinite(numbers)):
-        raise InvalidInput(f'<{element.tag} {key}="{text}">: give {count} finite number(s)')
-    return numbers

@@ -291,3 +291,62 @@ def test_a_damaged_record_of_the_file_is_refused_and_made_again(run: Results, da
         _ = run.foreign
     run_experiment(run.experiment, run.folder, progress=False)
     assert path.read_bytes() == whole
+
+
+def _feet_in_bodies(robot: Robot, path: Path, *, extra: Change | None = None) -> Path:
+    """The MJCF with each foot in a body of its own, welded to the calf, as some write it."""
+
+    def change(root: ElementTree.Element) -> None:
+        for leg in robot.legs:
+            calf = root.find(f".//body[@name='{leg}_calf']")
+            assert calf is not None
+            (frame,) = calf.findall("frame")  # of the foot's sphere
+            frame.tag = "body"
+            frame.set("quat", "0.6 0.8 0 0")
+            frame[0].set("mass", "0")
+            if extra is not None:
+                extra(calf)
+
+    return mjcf(robot, path, change)
+
+
+def test_feet_are_found_in_what_is_welded_to_the_last_link(robot: Robot, tmp_path: Path) -> None:
+    own = build_model(robot, IDEAL)
+    path = _feet_in_bodies(robot, tmp_path / "own.xml")
+    world = World(robot, replace(IDEAL, mjcf=str(path)), 1)
+    assert world.model.ngeom == own.ngeom  # no second, invisible sphere
+    world.reset(robot.standing[None, [0, 2]], robot.standing[None, 7:])
+    for _ in range(1000):
+        tau = 300.0 * (robot.standing[7:] - world.joints) - 8.0 * world.joint_rates
+        world.step(tau)
+    weight = world.model.body_mass.sum() * robot.gravity
+    assert world.force[0, :, 2].sum() == pytest.approx(weight, rel=1e-3)
+
+
+def test_a_sphere_of_the_knee_is_no_foot(robot: Robot, tmp_path: Path) -> None:
+    def knee(calf: ElementTree.Element) -> None:
+        ElementTree.SubElement(calf, "geom", type="sphere", size="0.03")
+
+    path = _feet_in_bodies(robot, tmp_path / "knee.xml", extra=knee)
+    model = build_model(robot, replace(IDEAL, mjcf=str(path)))
+    for foot in robot.foot_names:
+        assert model.geom(foot).size[0] == pytest.approx(0.02)
+
+
+def test_a_robot_that_would_not_stand_on_its_feet_is_refused(robot: Robot, tmp_path: Path) -> None:
+    def sole(calf: ElementTree.Element) -> None:
+        ElementTree.SubElement(calf, "geom", type="box", size="0.05 0.02 0.01", pos="0 0 -0.22")
+
+    path = _feet_in_bodies(robot, tmp_path / "sole.xml", extra=sole)
+    with pytest.raises(InvalidInput, match=r"sphere of foot FL_foot alone: another shape .* lower"):
+        build_model(robot, replace(IDEAL, mjcf=str(path)))
+
+
+def test_meshes_that_are_only_seen_may_be_missing_in_every_comparison(
+    robot: Robot, tmp_path: Path
+) -> None:
+    parity = compare_models(robot, mjcf(robot, tmp_path / "robot.xml"), states=5)
+    assert parity.mass_matrix is not None
+    # Armature apart, which our robot has not.
+    assert "mass" not in {row.what for row in parity.differences}
+    assert parity.jacobian == pytest.approx(0.0, abs=1e-5)
