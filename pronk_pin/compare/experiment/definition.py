@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
-from ...robot import Robot, feedback_gains
+from ...robot import Robot, feedback_gains, motor_constants
 from ...storage import sha256
 from ..world import mjcf_sha256 as mjcf_digest
 from .description import Description, describe
@@ -57,8 +57,9 @@ def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definit
 def _robot(robot: Robot) -> Definition:
     spec = describe(robot.spec)
     spec.pop("urdf")  # where it lies changes nothing; what it says does
-    kp, kd = feedback_gains(robot)  # which may be scaled from another robot's
-    return {**spec, "kp": list(kp), "kd": list(kd), "urdf_sha256": robot.sha256}
+    kp, kd = feedback_gains(robot)  # these and the motors may be scaled from another robot's
+    motors = describe(motor_constants(robot)._asdict())
+    return {**spec, **motors, "kp": list(kp), "kd": list(kd), "urdf_sha256": robot.sha256}
 
 
 def cell_definition(definition: Definition, cell: Cell) -> Definition:

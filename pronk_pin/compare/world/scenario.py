@@ -43,7 +43,7 @@ from ..._registry import (
 )
 from ..._typing import Array
 from ...errors import InvalidInput, UnknownName
-from ...robot import ROBOTS, Robot
+from ...robot import ROBOTS, Robot, motor_constants
 from ...storage import from_text
 from .mismatch import KNOWN, NOISE
 from .sensors import Sensors
@@ -61,6 +61,8 @@ _BY_JOINT = {
     "torque_constant": Interval(0, 10, above=True),
 }
 """What the joints' parameters can be, each of them."""
+_OF_MOTORS = {"armature": "rotors", "damping": "damping", "coulomb": "coulomb"}
+"""Those that may be left to the robot's motors, and what `motor_constants` calls them."""
 _NUMBERS = {
     "full_torque_speed": Interval(0, 1000, "rad/s"),
     "delay": Interval(0, 0.2, "s"),
@@ -103,9 +105,10 @@ class Scenario:
 
     Attributes:
         name: Short name, as on the command line.
-        armature: Rotor inertia as the joint feels it, through the gear, added [kg m^2].
-        damping: Viscous friction in the joints, added [N m s/rad].
-        coulomb: Coulomb friction in the joints, added [N m].
+        armature: Rotor inertia as the joint feels it, through the gear, added [kg m^2]; None for
+            that of the robot's motors, see `robot.motor_constants`.
+        damping: Viscous friction in the joints, added [N m s/rad]; None likewise.
+        coulomb: Coulomb friction in the joints, added [N m]; None likewise.
         torque_constant: Torque that a motor gives, over the torque it is asked for.
         full_torque_speed: Joint speed up to which a motor gives its greatest torque [rad/s].
         no_load_speed: Joint speed at which it gives none any more, falling linearly [rad/s]; None
@@ -140,9 +143,9 @@ class Scenario:
     """
 
     name: str
-    armature: ByJoint = 0.0
-    damping: ByJoint = 0.0
-    coulomb: ByJoint = 0.0
+    armature: ByJoint | None = 0.0
+    damping: ByJoint | None = 0.0
+    coulomb: ByJoint | None = 0.0
     torque_constant: ByJoint = 1.0
     full_torque_speed: float = 0.0
     no_load_speed: float | None = None
@@ -175,6 +178,8 @@ class Scenario:
         keep_reals(self, _NUMBERS, prefix)
         for name, within in _BY_JOINT.items():
             value = getattr(self, name)
+            if value is None and name in _OF_MOTORS:
+                continue
             several = isinstance(value, Sequence | np.ndarray) and np.ndim(value) > 0
             check = reals if several else real
             object.__setattr__(self, name, check(prefix + name, value, within))
@@ -233,6 +238,8 @@ class Scenario:
         """
         value = getattr(self, known_name("parameter of joints", name, _BY_JOINT))
         kinds = robot.spec.joints
+        if value is None:
+            value = getattr(motor_constants(robot), _OF_MOTORS[name])
         if isinstance(value, float):
             return np.full(robot.nu, value)
         if len(value) == len(kinds):
@@ -322,13 +329,11 @@ class Scenario:
         return (-self.gravity * math.sin(self.slope), 0.0, -self.gravity * math.cos(self.slope))
 
 
-_A1 = ROBOTS["a1"]
-
 BASE_SCENARIOS = {
     scenario.name: scenario
     for scenario in (
         Scenario("ideal"),
-        Scenario("nominal", armature=_A1.rotors[0], damping=_A1.damping[0], coulomb=_A1.coulomb[0]),
+        Scenario("nominal", armature=None, damping=None, coulomb=None),
     )
 }
 """Worlds to begin with: what the robot's own description says, and with what URDFs leave out."""
@@ -449,7 +454,7 @@ def _sample(seed: int, index: int) -> Scenario:
 
     return Scenario(
         f"random-{seed}-{index}",
-        armature=draw(0.6, 1.8) * _A1.rotors[0],
+        armature=draw(0.6, 1.8) * ROBOTS["a1"].rotors[0],
         damping=draw(0.02, 0.4),
         coulomb=draw(0.05, 0.5),
         torque_constant=draw(0.85, 1.05),
