@@ -18,7 +18,7 @@ from ..._checks import instance_of, known_name, none_or, path, real, seed, seque
 from ..._display import Displayed, listed, spanned
 from ...control import CONTROLLERS, PARTS, ControllerSpec, load_controller
 from ...errors import InvalidInput
-from ...gait import SPEEDS, STYLES, Gait, GaitLibrary, load_library
+from ...gait import STYLES, Gait, GaitLibrary, load_library
 from ...robot import (
     BASES,
     ROBOTS,
@@ -44,6 +44,13 @@ DEFAULT_CONTROLLERS = (
 )
 
 
+def default_controllers(robot: Robot) -> tuple[str, ...]:
+    """`DEFAULT_CONTROLLERS`, less those that need rotors which are not known of the robot."""
+    known = bool(robot.spec.rotors)
+    specs = [CONTROLLERS[name] for name in DEFAULT_CONTROLLERS]
+    return tuple(spec.name for spec in specs if known or spec.gait_model != "datasheet")
+
+
 Controllers: TypeAlias = Annotated[
     tuple[str | ControllerSpec, ...], by_names("[NAME|MODULE:OBJECT [...]]")
 ]
@@ -63,9 +70,10 @@ class Experiment(Displayed):
         gaits: Its gaits: "pronk", as shipped for it; or a `GaitLibrary`, or the file of one, as
             `pronk-pin gaits build` writes it.
         apex: Apex of the gaits [m], one that the library covers; by default the library's own.
-        speeds: Desired speeds [m/s].
+        speeds: Desired speeds [m/s]; by default all of the library.
         controllers: Controllers: any of `control.CONTROLLERS`, by name; a `ControllerSpec` of one's
-            own, or its address, module:object.
+            own, or its address, module:object. By default `DEFAULT_CONTROLLERS`, less those that
+            need rotors which are not known of the robot.
         scenarios: Scenarios by name, composed with "+", values with "=": nominal, ideal,
             payload=2+slope, random-0-3; or a `Scenario` of one's own, or its address; see
             `compare.world.scenario`.
@@ -84,8 +92,8 @@ class Experiment(Displayed):
     robot: Annotated[str | RobotSpec, by_name("NAME|FILE|MODULE:OBJECT")] = "a1"
     gaits: Annotated[str | GaitLibrary, by_name("NAME|FILE")] = "pronk"
     apex: float | None = None
-    speeds: tuple[float, ...] = SPEEDS
-    controllers: Controllers = DEFAULT_CONTROLLERS
+    speeds: tuple[float, ...] = ()
+    controllers: Controllers = ()
     scenarios: Scenarios = ("nominal",)
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
@@ -99,6 +107,10 @@ class Experiment(Displayed):
         self._check_types()
         keep(self, "robot", shortest("robot", load_robot_spec(self.robot), ROBOTS.get))
         keep(self, "gaits", self._known_gaits())
+        if not self.speeds:
+            keep(self, "speeds", tuple(self.library.speeds.tolist()))
+        if not self.controllers:
+            keep(self, "controllers", default_controllers(self.model))
         specs = [load_controller(value) for value in self.controllers]
         worlds = [load_scenario(value) for value in self.scenarios]
         keep_controllers = tuple(shortest("controller", spec, CONTROLLERS.get) for spec in specs)

@@ -105,7 +105,7 @@ def test_speeds_come_in_order_and_lists_are_as_good_as_tuples() -> None:
             {"scenarios": ("payload+slope", "slope+payload")},
             "scenarios must name at least one, and none of them twice",
         ),
-        ({"speeds": ()}, "speeds must name at least one, and none of them twice"),
+        ({"seeds": ()}, "seeds must name at least one, and none of them twice"),
         ({"controllers": ("pd", "pd")}, "controllers must name at least one, and none of them"),
         ({"seeds": (0, -1)}, "seeds[1]=-1; give a whole number from 0 on"),
         ({"base": "flying"}, "unknown base 'flying'; choose one of: locked, sagittal, free"),
