@@ -15,7 +15,7 @@ from pronk_pin import cli
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
 
-SLOW = ("whole_body_qp",)
+SLOW = ("own_robot", "whole_body_qp")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from .._checks import known_name, sequence_of, shown, text
+from .._checks import known_name, real, sequence_of, shown, text
 from ..errors import InvalidInput
 from ..robot import (
     Base,
@@ -107,14 +107,13 @@ def gait_problem(
         **_of_size(robot),
     }
     _check_changes(changes)
-    problem = GaitProblem(robot, speed, **(defaults | changes))
-    stands = float(robot.standing[2])
-    if not problem.apex > stands:
+    options, stands = defaults | changes, float(robot.standing[2])
+    if not real("apex", options["apex"]) > stands:
         raise InvalidInput(
-            f"apex {problem.apex:g} m: the {robot.name} stands at {stands:.3g} m already; give "
+            f"apex {options['apex']:g} m: the {robot.name} stands at {stands:.3g} m already; give "
             f"more, as {apex:g} m, or none for that"
         )
-    return problem
+    return GaitProblem(robot, speed, **options)
 
 
 def _of_size(robot: Robot) -> dict[str, float]:

@@ -82,7 +82,9 @@ def test_a_payload_is_a_point_and_a_shift_moves_the_trunk_alone(robot: Robot) ->
 def test_flight_agrees_with_mujoco_with_rotors_friction_motors_and_load(identified: Robot) -> None:
     model = parametrised_spec(identified).compile()
     # Coulomb friction is a constraint there: sliding fast, and stiff, it is the force it should be.
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+    model.opt.disableflags |= (
+        mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+    )
     data = mujoco.MjData(model)
     rng = np.random.default_rng(1)
     joints = [model.actuator(name).id for name in identified.joint_names]

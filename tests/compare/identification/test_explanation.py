@@ -347,7 +347,7 @@ def test_the_truth_of_an_mjcf_is_its_own(robot: Robot, tmp_path: Path) -> None:
     path = foreign_mjcf(robot, tmp_path / "robot.xml")
     scenario = load_scenario("nominal+payload=2+delay=0.003", mjcf=str(path))
     true = truth(robot, scenario)
-    rotor = SCENARIOS["nominal"].armature
+    rotor = robot.spec.rotors[0]
     for joint, armature in (("hip", 0.01), ("thigh", 0.01), ("calf", 0.02)):
         assert true[f"{joint} armature"] == pytest.approx(armature + rotor)
         assert true[f"{joint} damping"] == pytest.approx(0.7 + 0.1)
@@ -577,7 +577,7 @@ def test_the_command_prints_draws_and_writes(
     for file in files:
         assert file.stat().st_size > 1000
     joint = mujoco.MjModel.from_xml_path(str(files[2])).joint("FL_calf_joint")
-    assert float(joint.armature[0]) == pytest.approx(SCENARIOS["nominal"].armature, rel=0.03)
+    assert float(joint.armature[0]) == pytest.approx(load_robot().spec.rotors[0], rel=0.03)
     assert "95 % interval" in files[1].read_text()
 
 

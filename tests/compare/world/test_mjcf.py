@@ -27,7 +27,7 @@ from pronk_pin.compare.world.mjcf import mjcf_sha256
 from pronk_pin.errors import FileProblem, InvalidInput
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.parity import SIX_DIGITS, compare_models
-from pronk_pin.robot import Robot, load_robot
+from pronk_pin.robot import Robot, load_robot, motor_constants
 from pronk_pin.robot.formats.urdf import mujoco_spec
 
 IDEAL = load_scenario("ideal")
@@ -99,10 +99,10 @@ def test_what_the_joints_have_of_their_own_is_kept_and_the_scenario_adds_to_it(
     path = mjcf(robot, tmp_path / "robot.xml")
     model = build_model(robot, replace(load_scenario("nominal"), mjcf=str(path)))
     dofs = [model.joint(name).dofadr[0] for name in robot.joint_names]
-    nominal = load_scenario("nominal")
-    np.testing.assert_allclose(model.dof_armature[dofs], 0.01 + nominal.armature)
-    np.testing.assert_allclose(model.dof_damping[dofs], 0.7 + nominal.damping)
-    np.testing.assert_allclose(model.dof_frictionloss[dofs], 0.25 + nominal.coulomb)
+    motors = motor_constants(robot)
+    np.testing.assert_allclose(model.dof_armature[dofs], 0.01 + motors.rotors[0])
+    np.testing.assert_allclose(model.dof_damping[dofs], 0.7 + motors.damping[0])
+    np.testing.assert_allclose(model.dof_frictionloss[dofs], 0.25 + motors.coulomb[0])
 
 
 def test_servos_become_motors_and_ground_and_options_are_the_scenarios(

@@ -250,7 +250,7 @@ def test_joints_may_differ_by_kind_or_each(
     if servo is not None:
         limit = robot.tau_max * tiled["torque_constant"]
         np.testing.assert_allclose(model.actuator_forcerange[motors, 1], limit)
-        stiffness = servo.proportional * tiled["torque_constant"]
+        stiffness = servo.proportional(12) * tiled["torque_constant"]
         np.testing.assert_allclose(model.actuator_biasprm[motors, 1], -stiffness)
 
 
