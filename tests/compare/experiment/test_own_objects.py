@@ -59,7 +59,7 @@ def hardest(strides):
 
 
 hardest_landing = Metric("hardest_landing", "N", hardest)
-controller = ControllerSpec("mine", law=MyLaw(0.3))
+controller = ControllerSpec("mine", law=MyLaw(0.3), knows=("friction", "load"))
 untold = ControllerSpec("untold", law=Untold())
 hot = Scenario("hot", torque_constant=0.9, coulomb=0.4)
 number = 3
@@ -125,6 +125,7 @@ def test_what_is_stored_is_read_by_a_process_that_never_saw_the_class(laboratory
     ):
         done = _pronk_pin(command, elsewhere)
         assert done.returncode == 0, done.stderr
+    assert "| friction, load |" in (results.folder / "report.md").read_text()
     done = _pronk_pin(["compare", "--folder", folder, "--seeds", "0", "1"], elsewhere)
     assert done.returncode == 1
     assert f"{laboratory}:MyLaw: module {laboratory} cannot be imported" in done.stderr
