@@ -6,11 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from pronk_pin import load_robot
 from pronk_pin.compare import Experiment, Results, Scenario, random_scenarios
-from pronk_pin.control import CONTROLLERS, ControllerSpec
+from pronk_pin.control import CONTROLLERS, ControllerSpec, TorqueLibrary
 from pronk_pin.gait import load_library
 from pronk_pin.robot import ModelParameters
 
@@ -29,6 +30,7 @@ SHOWN = {
     "phase": LIBRARY.gaits[0].phases[1],
     "audit": LIBRARY.audit[0],
     "robot": load_robot("a1").with_parameters(ModelParameters(armature=(0.01,) * 3)),
+    "torques": TorqueLibrary(np.arange(2.0), *np.ones((2, 2, 2, 161, 12)), np.ones(2)),
     "experiment": LARGE,
     "results": Results(Path("results/<i>&\"mine'"), replace(LARGE, seeds=(0,))),
 }

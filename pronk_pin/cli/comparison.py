@@ -186,7 +186,9 @@ class Explain:
         if self.write_mjcf is not None:
             print(f"\nmjcf    {write_mjcf(explanation.identified, self.write_mjcf, notes)}")
         if self.close_loop:
-            print(f"\n{format_loop(close_loop(explanation, strides, rng=rng))}")
+            planned_at = results.experiment.planned_at
+            table = close_loop(explanation, strides, planned_at=planned_at, rng=rng)
+            print(f"\n{format_loop(table)}")
 
     def _check(self) -> None:
         """What can be told to be wrong before anything is read."""

@@ -27,6 +27,7 @@ from ..compare.studies import (
     sweep_gains,
 )
 from ..control import load_controller
+from ..gait import Gait
 from ..viz import known_figure, save_figure
 from ..viz.figures import errors_by_seed, gains_figure, predicted_and_measured, transfers_figure
 
@@ -59,17 +60,24 @@ class Analyze:
         """Do it."""
         whole("strides", self.strides, STRIDES)
         known_figure(self.figure)
-        spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        gaits: list[Gait] | None = None  # those that are shipped
         if self.result is None:
+            spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
             strides = simulate_learning(
                 spec, self.speed, scenario, robot=self.robot, strides=self.strides
             )
         else:
-            strides = stored_learning(Results.load(self.result), spec, self.speed, scenario)
+            results = Results.load(self.result)
+            experiment = results.experiment
+            spec = experiment.controller(self.controller)
+            scenario = experiment.scenario(self.scenario)
+            strides = stored_learning(results, spec, self.speed, scenario)
+            gaits = experiment.planned_at(self.speed)
         predictions = []
-        for speed in self.speed:
+        for k, speed in enumerate(self.speed):
+            gait = None if gaits is None else gaits[k]
             predictions.append(
-                compare_prediction(spec, strides, speed, scenario, number=self.strides)
+                compare_prediction(spec, strides, speed, scenario, number=self.strides, gait=gait)
             )
             print(describe_prediction(predictions[-1]), end="\n\n")
         print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")

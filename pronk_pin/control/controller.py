@@ -23,6 +23,7 @@ from .learning import (
     SKIPPED,
     GuardState,
     LawContext,
+    LearningLaw,
     Memory,
     anti_windup,
     bound,
@@ -164,6 +165,11 @@ class Controller:
     def flight(self) -> Array:
         """Durations of the flights' references [s], shape (n,)."""
         return self._flight.duration.copy()
+
+    @property
+    def laws(self) -> tuple[LearningLaw | None, ...]:
+        """The learning laws, bound to the robots, in the order of `PARTS`."""
+        return tuple(self._laws)
 
     @property
     def max_ticks(self) -> int:

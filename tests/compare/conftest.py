@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ from pronk_pin.compare import (
 )
 from pronk_pin.compare.metrics import COLUMNS
 from pronk_pin.control import ControllerSpec
-from pronk_pin.gait import Gait, load_library
+from pronk_pin.gait import Gait, GaitLibrary, load_library
 from pronk_pin.robot import Robot
 
 SPEEDS = (0.0, 0.45)
@@ -77,6 +78,18 @@ def simulation(robot: Robot, gaits: list[Gait]) -> Callable[..., Simulation]:
         )
 
     return build
+
+
+@pytest.fixture(scope="session")
+def twin() -> GaitLibrary:
+    """The A1's gaits as those of a robot of another name."""
+    library = load_library("a1")
+    gaits = tuple(replace(gait, robot="twin") for gait in library.gaits)
+    audits = tuple(
+        replace(audit, motion=gait.sha256) for gait, audit in zip(gaits, library.audit, strict=True)
+    )
+    metadata = {**library.metadata, "robot": "twin"}
+    return replace(library, gaits=gaits, audit=audits, metadata=metadata)
 
 
 PEAKS = {"pd": (0.10, 0.05), "ilc": (0.02, 0.01), "model": (0.03, 0.005)}

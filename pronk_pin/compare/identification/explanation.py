@@ -11,6 +11,7 @@ import pandas as pd
 import xarray as xr
 
 from ..._checks import Interval, instance_of, known_name, real, sequence_of, whole
+from ..._display import Displayed, listed, spanned
 from ...control import CONTROLLERS
 from ...errors import InvalidInput
 from ...gait import Gait, load_library
@@ -31,8 +32,8 @@ REPEATS = 0.95
 """Least repetition of a speed's strides that are explained, see `repetition`."""
 
 
-@dataclass(frozen=True, eq=False)
-class Explanation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Explanation(Displayed):
     """The learned torque by cause, and the identified model.
 
     Attributes:
@@ -62,6 +63,20 @@ class Explanation:
     repeated: bool
     true: Mapping[str, float]
     attributes: Mapping[str, str]
+
+    def _title(self) -> str:
+        what = " in ".join(
+            self.attributes[key] for key in ("controller", "scenario") if key in self.attributes
+        )
+        return f"Explanation of what {what or 'learning'} found, {self.robot.name}"
+
+    def _facts(self) -> dict[str, str]:
+        low, high = self.estimate.interval()
+        rows = zip(self.terms, self.estimate.value, high - low, self.confounding.seen, strict=True)
+        seen = {t.name: f"{v:.4g} ± {w / 2:.2g} [{t.unit}]" for t, v, w, sees in rows if sees}
+        unseen = [term.name for term in self.terms if term.name not in seen]
+        strides = {"speeds": spanned(self.speeds, "m/s"), "strides": f"{self.strides} of each"}
+        return {**strides, **seen, "not seen": listed(unseen)}
 
     @cached_property
     def parameters(self) -> ModelParameters:

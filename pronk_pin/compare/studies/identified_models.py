@@ -7,7 +7,7 @@ library of the learned speeds.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from tqdm import tqdm
 from ..._typing import Array
 from ...control import load_controller
 from ...errors import InvalidInput
-from ...gait import load_library, replan
+from ...gait import Gait, load_library, replan
 from ..experiment import initial_feedforward
 from ..identification import Explanation
 from ..metrics import by_joint
@@ -41,6 +41,7 @@ def close_loop(
     scenarios: Sequence[Scenario | str] | None = None,
     controllers: Sequence[str] = CONTROLLERS,
     schedule: Schedule = SCHEDULE,
+    planned_at: Callable[[Sequence[float]], Sequence[Gait]] | None = None,
     rng: np.random.Generator | None = None,
     progress: bool = True,
 ) -> pd.DataFrame:
@@ -54,6 +55,8 @@ def close_loop(
             model was not identified in.
         controllers: What is compared.
         schedule: What happens when; the law is on in its second part, whatever the speeds.
+        planned_at: Gives the planned gaits at some speeds, as `Experiment.planned_at` does; by
+            default the shipped ones of the robot.
         rng: Source of the scatter at the start; by default one that starts at 0.
         progress: Show a progress bar.
 
@@ -71,8 +74,11 @@ def close_loop(
     learned_speeds = strides["speed"].to_numpy()
     speeds = tuple(_between(learned_speeds) if speeds is None else speeds)
     scenarios_ = _scenarios(strides, scenarios)
-    library = load_library(explanation.robot.name)
-    gaits = [library.at(speed) for speed in speeds]
+    if planned_at is None:
+        library = load_library(explanation.robot.name)
+        gaits = [library.at(speed) for speed in speeds]
+    else:
+        gaits = list(planned_at(speeds))
     again = replan(explanation.identified, gaits) if "identified+gait" in controllers else gaits
     rows = []
     with tqdm(

@@ -12,9 +12,9 @@ import xarray as xr
 from ..._checks import Interval, reals, whole
 from ..._typing import Array
 from ...control import (
+    Controller,
     ControllerSpec,
     LiftedModel,
-    ModelBasedILC,
     PlanarStrides,
     StrideRecord,
     StrideSettings,
@@ -24,7 +24,7 @@ from ...control import (
 from ...control.prediction import Analysis, analyze, predict, rehearse
 from ...dynamics import Rotors
 from ...errors import InvalidInput
-from ...gait import load_library
+from ...gait import Gait, load_library
 from ...robot import JOINTS, load_robot, recorded_robot
 from ..report import number
 from ..results import Results
@@ -142,7 +142,13 @@ def stored_learning(
 
 
 def compare_prediction(
-    spec: ControllerSpec, strides: xr.Dataset, speed: float, scenario: Scenario, *, number: int
+    spec: ControllerSpec,
+    strides: xr.Dataset,
+    speed: float,
+    scenario: Scenario,
+    *,
+    number: int,
+    gait: Gait | None = None,
 ) -> Prediction:
     """Predict the errors of learning from the last stride before it, beside the measured ones.
 
@@ -155,19 +161,22 @@ def compare_prediction(
         speed: Which robot [m/s].
         scenario: The scenario that they were made in.
         number: Strides of learning; fewer if there are fewer.
+        gait: The gait that was played; by default the shipped one.
 
     Raises:
         InvalidInput: The controller does not learn, or there are no strides before its learning.
     """
-    law = learning_law(spec)
-    robot, gait = recorded_robot(strides.attrs), load_library(strides.attrs["robot"]).at(speed)
+    learning_law(spec)  # it has one
+    robot = recorded_robot(strides.attrs)
+    gait = load_library(robot.name).at(speed) if gait is None else gait
+    of_stance = replace(spec, flight_law=None, tick_controller=None)
+    law = Controller(robot, [gait], of_stance, timestep=scenario.timestep).laws[0]
+    assert law is not None
     settings = StrideSettings(
         spec.gains_of(robot), spec.regulator, spec.speed_filter, spec.touchdown_ticks
     )
     rotors = Rotors(*(scenario.by_joint(name, robot) for name in ("armature", "damping")))
     model = lifted_model(robot, gait, settings, rotors=rotors)
-    if isinstance(law, ModelBasedILC):
-        law = law.with_models([lifted_model(robot, gait, settings)])
     of_speed = strides.sel(speed=speed, method="nearest").sel(part="stance")
     count = int(of_speed["count"])
     first = int(np.argmax(of_speed["learning"].to_numpy()[:count] == 1))

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..._checks import numbers
 from ..._checks import path as known_path
+from ..._display import Displayed, spanned
 from ..._typing import Array, BoolArray
 from ...errors import InvalidInput, SpeedOutOfRange
 from ...storage import read_arrays, write_arrays
@@ -33,8 +34,8 @@ class InitialFeedforward(NamedTuple):
     """Durations of the flights' references [s], shape (n,); None as planned."""
 
 
-@dataclass(frozen=True)
-class TorqueLibrary:
+@dataclass(frozen=True, repr=False)
+class TorqueLibrary(Displayed):
     """Learned torques by speed, averaged over strides in steady state.
 
     Attributes:
@@ -68,6 +69,16 @@ class TorqueLibrary:
             )
         if np.any(np.diff(self.speeds) <= 0.0):
             raise InvalidInput("the speeds of a torque library must increase")
+
+    def _title(self) -> str:
+        return f"TorqueLibrary of {len(self.speeds)} speeds"
+
+    def _facts(self) -> dict[str, str]:
+        return {
+            "speeds": spanned(self.speeds, "m/s"),
+            "torque": f"up to {np.nanmax(np.abs(self.torque), initial=0.0):.3g} N m",
+            "samples": f"{self.torque.shape[2]} of each part",
+        }
 
     @classmethod
     def from_strides(cls, speeds: Array, torque: Array, flight: Array) -> TorqueLibrary:

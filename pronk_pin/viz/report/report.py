@@ -245,7 +245,7 @@ def _world(
     if len(scenarios) > 1:
         document.text(verdict(summary, scenario=scenario, table=table))
     document.table(report_tables.errors(table))
-    document.table(report_tables.motion(table))
+    document.table(report_tables.motion(table, results.experiment))
     units = units_of_intervals(table)
     document.text(f"Intervals are drawn over the {units}." if units else "", "note")
     if sampled(scenario):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ...compare import Experiment
 from ...compare.metrics import LEARNER, RIVAL, Interval
 from ...compare.report import (
     SHOWN,
@@ -18,7 +19,6 @@ from ...compare.report import (
     between,
     number,
 )
-from ...control import CONTROLLERS
 from ...parity import Parity, Row, format_value, merged
 from ..figure_style import in_order
 from ..figures import LABELS
@@ -117,11 +117,11 @@ def errors(table: Overview) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def motion(table: Overview) -> pd.DataFrame:
-    """What else is to be known of the controllers in a world."""
+def motion(table: Overview, experiment: Experiment) -> pd.DataFrame:
+    """What else is to be known of the controllers in a world, what they know among it."""
     rows = {}
     for name, row in table.items():
-        known = CONTROLLERS[name].knows if name in CONTROLLERS else ()
+        known = experiment.controller(name).knows
         cells: dict[str, str] = {"knows": ", ".join(known) or "nothing"}
         for joint in SHOWN:
             cells[f"{joint}: felt peak [rad]"] = number(row.joints[joint].felt, ".4f")

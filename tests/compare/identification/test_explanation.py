@@ -239,6 +239,14 @@ def test_all_causes_at_once_are_found_through_sensor_noise(found: Explanation) -
     assert list(table.index[~table["seen"]]) == ["trunk moment x", "trunk moment z"]
 
 
+def test_what_was_found_fits_on_a_screen(found: Explanation) -> None:
+    lines = repr(found).splitlines()
+    assert len(lines) <= 25
+    assert max(map(len, lines)) <= 100
+    assert any(line.split()[:2] == ["calf", "armature"] for line in lines)
+    assert "<table>" in found._repr_html_()
+
+
 def test_intervals_hold_the_truth(learned_strides: xr.Dataset, found: Explanation) -> None:
     """Over draws of the noise: in one of them all terms are off together."""
     inside = []

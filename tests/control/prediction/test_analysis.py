@@ -14,7 +14,13 @@ from pronk_pin.control import (
     ZeroPhaseFilter,
 )
 from pronk_pin.control.learning.lifted import LiftedModel as Model
-from pronk_pin.control.prediction.analysis import analyze, iteration, predict, quasi_static
+from pronk_pin.control.prediction.analysis import (
+    _radius,
+    analyze,
+    iteration,
+    predict,
+    quasi_static,
+)
 
 SAMPLES = 60
 
@@ -80,3 +86,8 @@ def test_the_papers_law_has_a_gain_of_2_and_lives_by_its_filters_leak() -> None:
     assert 1.0 - printed.left == pytest.approx(0.78, abs=0.005)  # of the error taken away
     exact = quasi_static(PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1)), plant)
     assert exact.multiplier == pytest.approx(-1.0, abs=0.01)
+
+
+def test_the_radius_is_found_where_all_eigenvalues_are_as_large() -> None:
+    """The Arnoldi iteration does not converge on a permutation."""
+    assert _radius(0.9 * np.roll(np.eye(200), 1, axis=0)) == pytest.approx(0.9)
