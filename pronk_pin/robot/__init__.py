@@ -38,7 +38,8 @@ from .state import (
     leg_indices,
     sound_base,
 )
-from .urdf_file import read_urdf
+from .urdf_document import check_shape, numbers_of, placement_of
+from .urdf_file import document_of, find_mesh, read_urdf
 
 __all__ = [
     "BASES",
@@ -63,12 +64,17 @@ __all__ = [
     "as_robot",
     "as_state",
     "by_state",
+    "check_shape",
+    "document_of",
+    "find_mesh",
     "from_mujoco",
     "from_paper",
     "joint_order",
     "leg_indices",
     "load_robot",
     "load_robot_spec",
+    "numbers_of",
+    "placement_of",
     "read_urdf",
     "recorded_robot",
     "robot_attributes",
