@@ -190,6 +190,21 @@ class WorkerLost(PronkError):
         )
 
 
+class NoMainGuard(PronkError):
+    """A script that starts processes, which import it, and would start their own.
+
+    Attributes:
+        script: Its path.
+    """
+
+    def __init__(self, script: str) -> None:
+        self.script = script
+        super().__init__(
+            f"{script}: the processes that it starts import it and come to its main code again; "
+            "guard your script with `if __name__ == '__main__':`, or give workers=1"
+        )
+
+
 class ExecutorUnavailable(PronkError):
     """An executor beyond this machine that cannot be used.
 
