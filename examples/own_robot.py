@@ -26,7 +26,9 @@ if __name__ == "__main__":
     file.write_text(SPECIFICATION)
     robot = load_robot(file)
     kp, kd = feedback_gains(robot)
-    print(f"{robot.name}: {robot.mass:.1f} kg, kp {kp}, kd {kd}, rotors {motor_constants(robot)[0]}")
+    print(
+        f"{robot.name}: {robot.mass:.1f} kg, kp {kp}, kd {kd}, rotors {motor_constants(robot)[0]}"
+    )
 
     gaits = build_library(robot, (0.0, 0.3), workers=2, progress=False)
     print(gaits)

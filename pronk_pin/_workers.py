@@ -6,16 +6,19 @@ this package, which takes seconds.
 
 from __future__ import annotations
 
+import ast
 import multiprocessing
 import os
 import shutil
 import signal
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from multiprocessing import connection
 from multiprocessing.sharedctypes import Synchronized
+from pathlib import Path
 from types import FrameType
 
 _steps_done: Synchronized[int] | None = None
@@ -42,6 +45,30 @@ def begin_worker(folder: str, counter: Synchronized[int] | None = None) -> None:
         os._exit(1)
 
     threading.Thread(target=follow, daemon=True).start()
+
+
+def leave_main_to_parent() -> None:
+    """End a worker that comes here while it imports the script that started it.
+
+    Processes import the script that they are to work for; one whose main code is not guarded would
+    start its own. The parent finds its workers gone, and says why, see `unguarded_script`.
+    """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise SystemExit(1)
+
+
+def unguarded_script() -> str:
+    """The main script, if nothing in it asks for `__name__`; empty otherwise."""
+    path = getattr(sys.modules["__main__"], "__file__", None)
+    try:
+        tree = ast.parse(Path(path).read_bytes()) if path else None
+    except (OSError, SyntaxError, ValueError):  # no script that can be looked at
+        return ""
+    if tree is None:
+        return ""
+    tests = [node.test for node in tree.body if isinstance(node, ast.If)]
+    names = [node.id for test in tests for node in ast.walk(test) if isinstance(node, ast.Name)]
+    return "" if "__name__" in names else str(path)
 
 
 def count_steps(steps: int) -> None:

@@ -5,7 +5,7 @@ Each class carries what is needed to investigate, and its message names the reme
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 _LONGEST_WORD = 60
@@ -190,6 +190,21 @@ class WorkerLost(PronkError):
         )
 
 
+class NoMainGuard(PronkError):
+    """A script that starts processes, which import it, and would start their own.
+
+    Attributes:
+        script: Its path.
+    """
+
+    def __init__(self, script: str) -> None:
+        self.script = script
+        super().__init__(
+            f"{script}: the processes that it starts import it and come to its main code again; "
+            "guard your script with `if __name__ == '__main__':`, or give workers=1"
+        )
+
+
 class ExecutorUnavailable(PronkError):
     """An executor beyond this machine that cannot be used.
 
@@ -254,4 +269,25 @@ class NoBrowser(PronkError):
             f"pictures and films are drawn by Chromium or Chrome without a window, and {reason}; "
             "install one ('apt install chromium'), or name its program in the environment variable "
             "PRONK_PIN_BROWSER; pages (--html) need none here"
+        )
+
+
+class PartNotShown(UserWarning):
+    """Parts of a robot that its pictures leave out.
+
+    Attributes:
+        robot: Name of the robot.
+        parts: Their names, and why they cannot be shown.
+    """
+
+    def __init__(self, robot: str, parts: Sequence[tuple[str, str]]) -> None:
+        self.robot, self.parts = robot, tuple(parts)
+        (name, reason), *others = self.parts
+        super().__init__(
+            f"{robot} is shown without {name} ({reason})"
+            + (
+                f" and {len(others)} more: {', '.join(other for other, _ in others)}"
+                if others
+                else ""
+            )
         )

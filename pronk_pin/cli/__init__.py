@@ -23,7 +23,7 @@ from .._checks import known_name
 from .._workers import handling
 from ..compare import Results
 from ..compare.experiment import SUITES, load_suite, read_config
-from ..errors import LeakyFilter, OtherMachine, PronkError
+from ..errors import LeakyFilter, OtherMachine, PartNotShown, PronkError
 from .comparison import Compare, Explain, Report, Reproduce
 from .gaits import Gaits
 from .ilc import Ilc
@@ -107,7 +107,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(arguments: list[str] | None) -> int:
     command = _parsed(todays_options(sys.argv[1:] if arguments is None else arguments))
     with warnings.catch_warnings():
-        for category in (LeakyFilter, OtherMachine):
+        for category in (LeakyFilter, OtherMachine, PartNotShown):
             warnings.simplefilter("once", category)
         warnings.showwarning = _show_warning
         return command.run() or 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -25,7 +26,7 @@ from ..compare.experiment import SUITES, load_suite
 from ..compare.identification import DRAWS, IMU_NOISE, check_learner
 from ..compare.report import format_changes, format_summary
 from ..compare.studies import close_loop, format_loop, format_reproduction
-from ..errors import InvalidInput
+from ..errors import PronkError
 from ..robot.formats import write_mjcf, write_urdf
 from ..viz import known_figure, write_replay
 from ..viz.figures import write_explanation_figure
@@ -75,7 +76,7 @@ class Compare:
         times = ", ".join(f"{name} {time:.3g}" for name, time in results.control_times.items())
         if times:
             print(f"\ntime that controllers took on this machine, a robot and tick [us]: {times}")
-        _write_pages(results)
+        _print_pages(results, _made(lambda: _report(results)))
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class Report:
             print(format_changes(results, Results.load(self.other)))
             return
         print(format_summary(results.summary()))
-        _write_pages(results)
+        _print_pages(results, str(_report(results)))
         if self.figures is not None:
             for path in write_figures(results, self.figures):
                 print(f"figure   {path}")
@@ -227,12 +228,22 @@ def command_line(experiment: Experiment) -> str:
     return " ".join(words)
 
 
-def _write_pages(results: Results) -> None:
-    """The report and the replay of a result, with their names printed."""
+def _report(results: Results) -> Path:
+    return write_report(results, command=command_line(results.experiment))
+
+
+def _print_pages(results: Results, report: str) -> None:
+    """Where result, report and replay are; the replay is written here."""
+    page = results.folder / "replay.html"
     print(f"\nresults  {results.folder}")
-    print(f"report   {write_report(results, command=command_line(results.experiment))}")
+    print(f"report   {report}")
+    print(f"replay   {_made(lambda: write_replay(result_menu(results), page))}")
+
+
+def _made(write: Callable[[], Path]) -> str:
+    """The path of a page, or why there is none: what is finished is not undone by its pictures."""
     try:
-        replay = str(write_replay(result_menu(results), results.folder / "replay.html"))
-    except InvalidInput as error:  # no stride was finished
-        replay = f"none: {error}"
-    print(f"replay   {replay}")
+        return str(write())
+    except Exception as error:  # of any library that draws
+        kind = "" if isinstance(error, PronkError) else f"{type(error).__name__}: "
+        return f"none: {kind}{' '.join(str(error).split())}"

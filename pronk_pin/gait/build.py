@@ -27,8 +27,8 @@ from tqdm import tqdm
 from .._checks import path as known_path
 from .._checks import reals, worker_count
 from .._typing import Array
-from .._workers import begin_worker
-from ..errors import FileProblem, GaitNotFound, InvalidInput, WorkerLost
+from .._workers import begin_worker, leave_main_to_parent, unguarded_script
+from ..errors import FileProblem, GaitNotFound, InvalidInput, NoMainGuard, WorkerLost
 from ..robot import Base, Robot, RobotSpec, as_robot, load_robot
 from ..storage import clear_partial_files, read_arrays, temporary_folder, write_arrays
 from .audit import audit, bezier_orders
@@ -91,7 +91,10 @@ def build_library(
             were found are in the folder.
         FileProblem: A file of the folder is damaged or of another problem, or one cannot be
             written.
+        WorkerLost: Workers ended in the middle of their work.
+        NoMainGuard: They ended at once, as the script that wants them guards no main code.
     """
+    leave_main_to_parent()
     began = time.perf_counter()
     style = load_style(gait)
     apex = style.apex_of(as_robot(robot))
@@ -249,6 +252,8 @@ def _solve_all(
                     waiting, done, parents, tasks, min(workers, len(waiting)), bar, failed
                 )
             except BrokenProcessPool as error:
+                if script := unguarded_script():
+                    raise NoMainGuard(script) from error
                 place = next(iter(tasks.values())).path.parent
                 raise WorkerLost(place) from error
     if failed:

@@ -48,7 +48,8 @@ from .state import (
     leg_indices,
     sound_base,
 )
-from .urdf_file import read_urdf
+from .urdf_document import check_shape, numbers_of, placement_of
+from .urdf_file import document_of, find_mesh, read_urdf
 
 __all__ = [
     "BASES",
@@ -73,7 +74,10 @@ __all__ = [
     "as_robot",
     "as_state",
     "by_state",
+    "check_shape",
+    "document_of",
     "feedback_gains",
+    "find_mesh",
     "from_mujoco",
     "from_paper",
     "joint_order",
@@ -82,6 +86,8 @@ __all__ = [
     "load_robot",
     "load_robot_spec",
     "motor_constants",
+    "numbers_of",
+    "placement_of",
     "read_urdf",
     "recorded_robot",
     "robot_attributes",

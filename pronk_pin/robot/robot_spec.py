@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import xml.etree.ElementTree as ElementTree
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,13 +38,22 @@ CENTRE = " (centre)"
 _DATA_DISTRIBUTION = "example-robot-data"
 
 
+def _own_file(urdf: str) -> str:
+    """The absolute path of a file that is there, whatever the current folder is later on."""
+    with suppress(OSError, ValueError, RuntimeError):  # a name that no file can have
+        path = Path(urdf).expanduser()
+        return str(path.resolve()) if not path.is_absolute() and path.is_file() else urdf
+    return urdf
+
+
 @dataclass(frozen=True)
 class RobotSpec:
     """Roles of the names of a URDF in a legged robot.
 
     Attributes:
         name: Short name, as on the command line.
-        urdf: Path of the URDF: absolute, or relative to the `robots` folder of example-robot-data.
+        urdf: Path of the URDF: a file's, which is kept as an absolute one, or relative to the
+            `robots` folder of example-robot-data.
         base_link: Link of the trunk.
         legs: Legs in Pinocchio's order, which is alphabetical.
         joints: What the URDF calls a leg's joints, from the trunk down. Closed-form leg kinematics
@@ -92,6 +102,7 @@ class RobotSpec:
         for name in ("urdf", "base_link", "joint_pattern", "foot_pattern"):
             if not text(name, getattr(self, name)):
                 raise InvalidInput(f"{name} is empty; give what stands in the URDF")
+        object.__setattr__(self, "urdf", _own_file(self.urdf))
         for name in ("legs", "joints"):
             object.__setattr__(self, name, sequence_of(name, getattr(self, name), text))
         self._check_patterns()

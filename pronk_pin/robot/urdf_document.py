@@ -87,8 +87,8 @@ def check_document(root: ElementTree.Element) -> None:
     for link in root.findall("link"):
         with _naming("link", link):
             _check_inertial(link)
-            for shape in (*link.findall("collision"), *link.findall("visual")):
-                _check_shape(shape)
+            for shape in link.findall("collision"):
+                check_shape(shape)
     for joint in root.findall("joint"):
         with _naming("joint", joint):
             _check_joint(joint)
@@ -122,7 +122,12 @@ def _mass(inertial: ElementTree.Element) -> float:
     return float(numbers_of(inertial.findall("mass")[0], "value", None, 1)[0])
 
 
-def _check_shape(shape: ElementTree.Element) -> None:
+def check_shape(shape: ElementTree.Element) -> None:
+    """Check a `<collision>` or a `<visual>`.
+
+    Raises:
+        InvalidInput: A number of it cannot be read, or a size is none.
+    """
     placement_of(shape)
     for solid in shape.findall("geometry/*"):
         for key, count in _SIZES.get(solid.tag, ()):

@@ -7,7 +7,6 @@ import os
 import tempfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
-from copy import deepcopy
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,6 +43,52 @@ class Urdf(NamedTuple):
     model: pin.Model
 
 
+def document_of(data: bytes) -> ElementTree.Element:
+    """The document of a URDF that was read, as `Urdf.root`."""
+    root = ElementTree.fromstring(data)
+    release_base(root)
+    return root
+
+
+def find_mesh(address: str, urdf: Path, package_dir: Path) -> Path:
+    """The file that the address of a mesh means.
+
+    That of a package is sought in a folder of its name above the URDF, in `package_dir`, and where
+    `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` say.
+
+    Args:
+        address: The address, as it stands in the URDF.
+        urdf: The URDF.
+        package_dir: Another folder with packages in it.
+
+    Raises:
+        FileProblem: There is no such file.
+    """
+    scheme, separator, rest = address.partition("://")
+    if not separator or scheme == "file":
+        places = [urdf.parent / (rest if separator else address)]
+        remedy = "put it there"
+    else:
+        package, _, rest = rest.partition("/")
+        ros, ament = (
+            [Path(entry) for entry in os.environ.get(name, "").split(os.pathsep) if entry]
+            for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
+        )
+        packages = [folder for folder in (*urdf.parents, *ros) if folder.name == package]
+        packages += [package_dir / package, *(folder / package for folder in ros)]
+        packages += [folder / "share" / package for folder in ament]
+        places = [folder / rest for folder in packages]
+        remedy = (
+            f"put it into a folder named {package} above the URDF, or that folder's place into "
+            "ROS_PACKAGE_PATH"
+        )
+    for place in places:
+        with contextlib.suppress(OSError, ValueError):  # a name that no file can have
+            if place.is_file():
+                return place
+    raise FileProblem(urdf, f"mesh {address} is not there", remedy)
+
+
 def read_urdf(path: Path) -> Urdf:
     """Read a URDF.
 
@@ -61,19 +106,16 @@ def read_urdf(path: Path) -> Urdf:
         raise _xacro(path)
     refuse_nan(root, path, _CHECK, what="URDF")  # a mass of NaN is taken for none
     try:
-        released = release_base(root)
+        release_base(root)
         check_document(root)
     except InvalidInput as error:
         raise FileProblem(path, f"not a usable URDF ({error})", _CHECK) from error
     said: list[str] = []
     try:
-        # What Pinocchio calls reads UTF-8 only.
-        text = data.decode()
+        data.decode()  # what others call reads UTF-8 only
         endless = endless_joints(root)
-        if released or any(joint.get("type") == "continuous" for joint in endless):
-            text = _with_angles(root)
         with _overheard(said):
-            model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+            model = pin.buildModelFromXML(_mechanism(root), pin.JointModelFreeFlyer())
         if said:  # it goes on without the link's inertia, say
             raise ValueError("and leaves that out")
     except Exception as error:
@@ -98,16 +140,22 @@ def _xacro(path: Path) -> FileProblem:
     )
 
 
-def _with_angles(root: ElementTree.Element) -> str:
-    """The document with continuous joints as revolute ones, so that q has an angle for each."""
-    copy = deepcopy(root)
-    for joint in copy.findall("joint"):
-        if joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-            limit = joint.find("limit")
-            if limit is None:
-                ElementTree.SubElement(joint, "limit", effort="0", velocity="0")
-    return ElementTree.tostring(copy, encoding="unicode")
+def _mechanism(root: ElementTree.Element) -> str:
+    """The document without shapes and colours, whose faults are none of the mechanism; continuous
+    joints are revolute ones, so that q has an angle for each."""
+    mechanism = ElementTree.Element(root.tag, root.attrib)
+    for link in root.findall("link"):
+        own = ElementTree.SubElement(mechanism, "link", link.attrib)
+        own.extend(link.findall("inertial"))
+    for joint in root.findall("joint"):
+        if joint.get("type") != "continuous":
+            mechanism.append(joint)
+            continue
+        own = ElementTree.SubElement(mechanism, "joint", {**joint.attrib, "type": "revolute"})
+        own.extend(joint)
+        if joint.find("limit") is None:
+            ElementTree.SubElement(own, "limit", effort="0", velocity="0")
+    return ElementTree.tostring(mechanism, encoding="unicode")
 
 
 def _set_endless(model: pin.Model, joint: ElementTree.Element) -> None:

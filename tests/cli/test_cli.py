@@ -89,6 +89,21 @@ def test_one_speed_and_one_controller_are_a_comparison_too(
     }
 
 
+def test_a_picture_that_fails_does_not_fail_a_finished_comparison(
+    result: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise RuntimeError("of a library that draws")
+
+    for name in ("write_report", "write_replay"):
+        monkeypatch.setattr(f"pronk_pin.cli.comparison.{name}", fail)
+    controllers = ["--controllers", "pd", "ilc", "library"]
+    assert main(["compare", *SHORT, *controllers, "--folder", str(result), "--workers", "1"]) == 0
+    output = capsys.readouterr().out
+    for page in ("report", "replay"):
+        assert f"{page}   none: RuntimeError: of a library that draws" in output
+
+
 def test_report_prints_the_table_again(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (result / "report.html").unlink()
     assert main(["report", str(result)]) == 0

@@ -75,6 +75,18 @@ def test_a_urdf_of_ones_own_is_read_from_its_path(robot: Robot) -> None:
     np.testing.assert_array_equal(own.standing, robot.standing)
 
 
+def test_a_relative_path_is_the_file_that_is_there(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.urdf").write_bytes(robot.urdf)
+    monkeypatch.chdir(tmp_path)
+    specs = [RobotSpec("mine", urdf) for urdf in ("./mine.urdf", "mine.urdf")]
+    monkeypatch.chdir("/")  # as that of a worker, or of who reads the results
+    for spec in specs:
+        assert load_robot(spec).urdf_path == tmp_path / "mine.urdf"
+    assert RobotSpec("a1", "a1_description/urdf/a1.urdf").urdf == "a1_description/urdf/a1.urdf"
+
+
 def test_what_pinocchio_says_of_a_urdf_is_part_of_the_one_line(
     robot: Robot, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

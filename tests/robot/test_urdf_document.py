@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -65,7 +66,11 @@ HIP = r'(<joint name="FL_hip_joint".*?)'
         (HIP + r'xyz="[^"]+"', r'\1xyz="0.2 0.1"', r'joint FL_hip_joint: <origin xyz="0.2 0.1">'),
         (r'radius="0.02"', 'radius="2cm"', r'link FR_foot: <sphere radius="2cm">'),
         (r'radius="0.02"', 'radius="-0.02"', r'link FR_foot: <sphere radius="-0.02">: give what'),
-        (r'box size="[^"]+"', 'box size="1 1"', r'link base: <box size="1 1">: give 3 finite'),
+        (
+            r'(<collision>[^!]*?<box size=)"[^"]+"',
+            r'\1"1 1"',
+            r'link trunk: <box size="1 1">: give 3 finite',
+        ),
         (HIP + "revolute", r"\1floating", "joint FL_hip_joint: it is floating"),
         (HIP + "revolute", r"\1planar", "joint FL_hip_joint: it is planar"),
         (
@@ -81,6 +86,35 @@ def test_a_fault_is_named_with_its_link_or_joint(
 ) -> None:
     with pytest.raises(FileProblem, match=message):
         written(old, new)
+
+
+@pytest.mark.parametrize(
+    "visual",
+    [
+        "<geometry><box size='1 1'/></geometry>",
+        "<geometry><capsule radius='1' length='1'/></geometry>",
+        "<geometry><mesh filename='package://nowhere/lost.stl'/></geometry>",
+        "<geometry><sphere radius='1'/></geometry><material name='unknown'/>",
+        "",
+    ],
+)
+def test_faults_of_what_is_only_seen_are_none_of_the_robot(
+    written: Write, robot: Robot, visual: str
+) -> None:
+    own = written('(<link name="trunk">)', rf"\1<visual>{visual}</visual>")
+    assert own.mass == robot.mass
+    assert compare_models(own, mujoco_spec(own).compile(), states=2).agrees
+
+
+def test_a_capsule_meets_the_ground_as_one(written: Write, robot: Robot) -> None:
+    shape = "<collision><geometry><capsule radius='0.05' length='0.2'/></geometry></collision>"
+    cone = "<collision><geometry><cone radius='0.05' length='0.2'/></geometry></collision>"
+    own = written('(<link name="trunk">)', rf"\1{shape}{cone}")
+    assert own.mass == robot.mass
+    model = mujoco_spec(own).compile()
+    assert model.ngeom == mujoco_spec(robot).compile().ngeom + 1
+    size = model.geom_size[model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE]
+    np.testing.assert_allclose(size[:, :2], [[0.05, 0.1]])
 
 
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro" '

@@ -22,9 +22,9 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from ..._checks import instance_of, path, worker_count
-from ..._workers import count_steps
+from ..._workers import count_steps, leave_main_to_parent, unguarded_script
 from ...control import ControlTime
-from ...errors import FileProblem, WorkerLost
+from ...errors import FileProblem, NoMainGuard, WorkerLost
 from ..experiment import LIBRARY_VARIABLES, Cell, Experiment, run_cell
 from ..metrics import CellSummary, join_summaries, summarize_cell
 from ..results import (
@@ -84,7 +84,9 @@ def run_experiment(
             large: see `check_demand`.
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
+        NoMainGuard: They ended at once, as the script that wants them guards no main code.
     """
+    leave_main_to_parent()
     instance_of("experiment", experiment, Experiment)
     workers, folder = worker_count(workers), path("folder", folder)
     if executor is None:
@@ -226,6 +228,7 @@ class _Run:
 
         Raises:
             WorkerLost: They were lost again and again.
+            NoMainGuard: They cannot come to work.
         """
         for _ in range(MAX_RETRIES):
             with open_pool() as pool:
@@ -234,6 +237,8 @@ class _Run:
                     return self._play(pool, [c for c in cells if c in self.missing])
                 except pool.lost as error:
                     reason = error
+                    if pool.steps is not None and (script := unguarded_script()):
+                        raise NoMainGuard(script) from error
         raise WorkerLost(self.results.folder) from reason
 
     def _play(self, pool: WorkerPool, waiting: list[Cell]) -> None:

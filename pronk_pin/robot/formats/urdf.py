@@ -19,6 +19,9 @@ from ..urdf_document import numbers_of, placement_of, release_base
 
 _WORLD = "pronk_pin_world"
 
+_SOLIDS = {"box", "sphere", "cylinder", "capsule"}
+"""Shapes that MuJoCo knows; a mesh may be missing, and is left out."""
+
 
 def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
     """Read the robot's URDF into MuJoCo: a floating base, the fixed links fused.
@@ -30,7 +33,7 @@ def mujoco_spec(robot: Robot, *, collisions: bool = True) -> mujoco.MjSpec:
 
     Args:
         robot: The robot.
-        collisions: Keep the collision shapes that are not meshes.
+        collisions: Keep the collision shapes that are boxes, spheres, cylinders or capsules.
 
     Raises:
         FileProblem: MuJoCo refuses the URDF.
@@ -79,7 +82,8 @@ def _drop_shapes(root: ElementTree.Element, *, collisions: bool) -> None:
         for visual in link.findall("visual"):
             link.remove(visual)
         for shape in link.findall("collision"):
-            if not collisions or shape.find("geometry/mesh") is not None:
+            kinds = {solid.tag for solid in shape.findall("geometry/*")}
+            if not collisions or not kinds <= _SOLIDS:
                 link.remove(shape)
 
 

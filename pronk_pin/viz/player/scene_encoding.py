@@ -21,6 +21,10 @@ _USE_STEPS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 # Ends of the colour scales [rad], [of the limit].
 
 
+_USUAL_HEIGHT = 0.36
+"""Height of a standing trunk up to which the camera need not step back [m]."""
+
+
 def robot_blob(scene: Scene) -> bytes:
     """Static part of a scene for the page: shapes, joints, names, colours."""
     look, robot = scene.appearance, scene.robot
@@ -52,6 +56,7 @@ def robot_blob(scene: Scene) -> bytes:
             "shown": _shown_joint(names),
             "legs": list(robot.legs),
             "footRadius": robot.foot_radius,
+            "size": max(1.0, float(robot.standing[2]) / _USUAL_HEIGHT),
             "torqueLimits": robot.tau_max.tolist(),
             "scale": [to_hex(c) for c in colormaps[SEQUENTIAL](np.linspace(0.0, 1.0, 32))],
         }

@@ -6,7 +6,7 @@ Goes out: a `Scene`, or a `Menu` of scenes.
 
 from .gait_scenes import gait_scene, library_menu, nearest
 from .menu import Choice, Menu
-from .meshes import Mesh
+from .mesh_files import Mesh
 from .scene import CHANNELS, GHOST_COLOR, SECOND_COLOR, Color, Mark, Scene, Track
 from .stride_scenes import result_menu
 

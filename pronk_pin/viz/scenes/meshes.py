@@ -1,42 +1,28 @@
-"""Visual geometry of the robot, with meshes light enough for a page.
-
-The A1's meshes have 216,000 triangles, most of them for screws. They are thinned out once in a
-process; a page with two robots then fits into two megabytes.
-"""
+"""Visual geometry of the robot: what its URDF shows of each link."""
 
 from __future__ import annotations
 
+import warnings
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import TypeAlias
 
-import coal
-import fast_simplification
 import numpy as np
 import pinocchio as pin
 
-from ..._typing import Array, IntArray
-from ...errors import FileProblem, InvalidInput
-from ...robot import Robot
-
-MOST_TRIANGLES = 2000
-"""Triangles that a mesh is thinned out to, as far as that leaves its shape."""
+from ..._typing import Array
+from ...errors import InvalidInput, PartNotShown, PronkError
+from ...robot import Robot, check_shape, document_of, find_mesh, numbers_of, placement_of
+from .mesh_files import Mesh, load_mesh, thin
 
 SMALLEST = 0.005
 """Visuals smaller than this are left out [m]: the A1's URDF marks its frames with 1 mm boxes."""
 
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """A triangle mesh.
-
-    Attributes:
-        vertices: Vertices [m], shape (n, 3).
-        faces: Indices of the vertices of each triangle, shape (m, 3).
-    """
-
-    vertices: Array
-    faces: IntArray
+_GREY = (0.9, 0.9, 0.9)
+"""Of what the URDF gives no colour."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +30,9 @@ class Solid:
     """A shape that the page draws itself, about the origin.
 
     Attributes:
-        kind: "box", "sphere" or "cylinder".
-        size: Edges of a box, radius of a sphere, radius and length along z of a cylinder [m].
+        kind: "box", "sphere", "cylinder", "capsule" or "cone".
+        size: Edges of a box, radius of a sphere, else radius and length along z, that of a capsule
+            without its round ends [m]. A cone's tip is at positive z.
     """
 
     kind: str
@@ -60,7 +47,7 @@ class Part:
     """One visual of the robot.
 
     Attributes:
-        name: Name of Pinocchio's geometry object.
+        name: Name of its link, and its number there, as Pinocchio names geometry objects.
         joint: Number of the joint that moves it, in Pinocchio's order; 1 is the floating base.
         placement: Its pose in the joint's frame, shape (4, 4).
         shape: Its surface in its own frame; parts of the same mesh share one.
@@ -120,32 +107,57 @@ class Appearance:
 def appearance(robot: Robot) -> Appearance:
     """The visuals of a robot, thinned out.
 
+    One that cannot be shown, whose mesh is missing, say, is left out, with the warning
+    `PartNotShown`.
+
     Raises:
-        FileProblem: A mesh that the URDF names is missing or cannot be read.
-        InvalidInput: A visual or a joint is of a kind that cannot be shown.
+        InvalidInput: A joint is of a kind that cannot be shown.
     """
-    try:
-        model = pin.buildGeomFromUrdf(
-            robot.model,
-            str(robot.urdf_path),
-            pin.GeometryType.VISUAL,
-            package_dirs=[str(robot.package_dir)],
-        )
-    except (ValueError, RuntimeError) as error:
-        remedy = "check the meshes beside the URDF"
-        raise FileProblem(
-            robot.urdf_path, f"a visual cannot be loaded ({error})", remedy
-        ) from error
-    thinned: dict[tuple[str, tuple[float, ...]], Mesh] = {}
-    parts = []
-    for item in model.geometryObjects:
-        item.geometry.computeLocalAABB()
-        extent = item.geometry.aabb_local
-        if np.max(extent.max_ - extent.min_) > SMALLEST:
-            r, g, b = (float(c) for c in item.meshColor[:3])
-            place, shape = item.placement.homogeneous, _shape(item, thinned)
-            parts.append(Part(item.name, int(item.parentJoint), place, shape, (r, g, b)))
+    thinned: dict[tuple[Path, tuple[float, ...]], Mesh] = {}
+    parts, missing = [], []
+    for name, frame, visual, color in _visuals(robot):
+        try:
+            shape = _shape(robot, visual, thinned)
+            if _extent(shape) <= SMALLEST:
+                continue
+            place = (frame.placement * placement_of(visual)).homogeneous
+        except PronkError as error:
+            missing.append((name, str(error)))
+            continue
+        parts.append(Part(name, int(frame.parentJoint), place, shape, color))
+    if missing:
+        warnings.warn(PartNotShown(robot.name, missing), stacklevel=2)
     return Appearance(robot, _joints(robot), tuple(parts))
+
+
+def _visuals(
+    robot: Robot,
+) -> Iterator[tuple[str, pin.Frame, ElementTree.Element, tuple[float, float, float]]]:
+    """Of each visual its name, its link's frame, its element, and its colour."""
+    root = document_of(robot.urdf)
+    colors: dict[str, tuple[float, float, float]] = {}
+    for material in (*root.findall("material"), *root.findall("link/visual/material")):
+        if (own := _color(material)) is not None:
+            colors.setdefault(material.get("name", ""), own)  # the first of a name is its colour
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        frame = robot.model.frames[robot.model.getFrameId(name, pin.BODY)]
+        for number, visual in enumerate(link.findall("visual")):
+            named = [material.get("name", "") for material in visual.findall("material")]
+            color = colors.get(named[0], _GREY) if named else _GREY
+            yield f"{name}_{number}", frame, visual, color
+
+
+def _color(material: ElementTree.Element) -> tuple[float, float, float] | None:
+    """The colour of a material; None where it has none that can be read."""
+    element = material.find("color")
+    if element is None:
+        return None
+    try:
+        r, g, b, _ = np.clip(numbers_of(element, "rgba", None, 4), 0.0, 1.0)
+    except InvalidInput:
+        return None
+    return float(r), float(g), float(b)
 
 
 def _joints(robot: Robot) -> tuple[Joint, ...]:
@@ -165,37 +177,35 @@ def _joints(robot: Robot) -> tuple[Joint, ...]:
     return tuple(found)
 
 
-def _shape(item: pin.GeometryObject, thinned: dict[tuple[str, tuple[float, ...]], Mesh]) -> Shape:
+def _shape(
+    robot: Robot, visual: ElementTree.Element, thinned: dict[tuple[Path, tuple[float, ...]], Mesh]
+) -> Shape:
     """The shape of a visual; `thinned` remembers the meshes that several visuals share."""
-    shape = item.geometry
-    if isinstance(shape, coal.Sphere):
-        return Solid("sphere", (shape.radius,))
-    if isinstance(shape, coal.Box):
-        return Solid("box", tuple((2.0 * shape.halfSide).tolist()))
-    if isinstance(shape, coal.Cylinder):
-        return Solid("cylinder", (shape.radius, 2.0 * shape.halfLength))
-    if not isinstance(shape, coal.BVHModelBase):
-        raise InvalidInput(
-            f"visual '{item.name}' is a {type(shape).__name__}; "
-            "use meshes, boxes, spheres or cylinders in the URDF"
-        )
-    key = (item.meshPath, tuple(item.meshScale))
+    check_shape(visual)
+    solid = next(iter(visual.findall("geometry/*")), None)
+    if solid is None:
+        raise InvalidInput("it has no geometry")
+    if solid.tag == "box":
+        x, y, z = numbers_of(solid, "size", None, 3)
+        return Solid("box", (float(x), float(y), float(z)))
+    if solid.tag in ("sphere", "cylinder", "capsule", "cone"):
+        keys = ("radius",) if solid.tag == "sphere" else ("radius", "length")
+        return Solid(solid.tag, tuple(float(numbers_of(solid, k, None, 1)[0]) for k in keys))
+    if solid.tag != "mesh":
+        raise InvalidInput(f"<{solid.tag}> is no shape that can be drawn")
+    path = find_mesh(solid.get("filename", ""), robot.urdf_path, robot.package_dir)
+    scale = numbers_of(solid, "scale", "1 1 1", 3)
+    key = (path, tuple(scale))
     if key not in thinned:
-        triangles = map(shape.tri_indices, range(shape.num_tris))
-        faces = np.array([(t[0], t[1], t[2]) for t in triangles], dtype=np.intp)
-        thinned[key] = thin(Mesh(np.array(shape.vertices(), dtype=float), faces))
+        thinned[key] = thin(load_mesh(path, scale))
     return thinned[key]
 
 
-def thin(mesh: Mesh, *, most: int = MOST_TRIANGLES) -> Mesh:
-    """Merge the vertices of a mesh where that changes its surface least, to so many triangles.
-
-    By quadric error (M. Garland and P. Heckbert, Surface simplification, 1997), so that edges and
-    corners survive; what would lose its shape keeps more triangles.
-    """
-    # Files often have a vertex once for each face around it, and a seam would count as an edge.
-    vertices, index = np.unique(mesh.vertices.round(9), axis=0, return_inverse=True)
-    faces = index.reshape(-1)[mesh.faces].astype(np.int32)
-    faces = faces[(np.diff(np.sort(faces)) > 0).all(axis=1)]  # the others have no area
-    target = min(most, len(faces))
-    return Mesh(*fast_simplification.simplify(vertices, faces, target_count=target, agg=3))
+def _extent(shape: Shape) -> float:
+    """The longest edge of the box about a shape [m]."""
+    if isinstance(shape, Mesh):
+        return float(np.ptp(shape.vertices, axis=0).max())
+    if shape.kind == "box":
+        return max(shape.size)
+    radius, *length = shape.size
+    return max(2.0 * radius, sum(length) + (2.0 * radius if shape.kind == "capsule" else 0.0))

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -31,6 +32,7 @@ EXPERIMENT = Experiment(
 )
 COMMAND = """
 import sys
+import textwrap
 from pathlib import Path
 from tests.compare.execution.test_executors import EXPERIMENT
 from pronk_pin.compare import run_experiment
@@ -123,6 +125,34 @@ def test_workers_that_die_again_and_again_end_the_run_with_the_remedy(tmp_path: 
     with pytest.raises(WorkerLost) as caught:
         run_experiment(EXPERIMENT, tmp_path / "new", executor=Broken(), progress=False)
     assert str(caught.value).endswith(f"'--folder {tmp_path / 'new'} --workers 1' to complete it")
+
+
+_SCRIPTS = {
+    "run_experiment": """
+        from pronk_pin.compare import Experiment, Schedule, run_experiment
+        short = Schedule(baseline=0.5, learning=0.5)
+        made = Experiment(speeds=(0.0,), controllers=("pd", "model"), schedule=short)
+        run_experiment(made, "results", workers=2, progress=False)
+    """,
+    "build_library": """
+        from pronk_pin.gait import build_library
+        from pronk_pin.robot import load_robot
+        build_library(load_robot("a1"), (0.0, 0.1), workers=2, progress=False)
+    """,
+}
+
+
+@pytest.mark.parametrize("name", _SCRIPTS)
+def test_a_script_whose_main_code_is_not_guarded_is_told_so(name: str, tmp_path: Path) -> None:
+    script = tmp_path / "mine.py"
+    script.write_text(textwrap.dedent(_SCRIPTS[name]))
+    ended = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.count("Traceback") <= 2  # the error, and what came before it
+    assert "guard your script with `if __name__ == '__main__':`" in ended.stderr.splitlines()[-1]
+    assert not (tmp_path / "results").exists()
 
 
 class Inline(Executor):

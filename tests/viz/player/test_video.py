@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,11 +16,22 @@ import pytest
 from PIL import Image
 
 from pronk_pin.errors import FileProblem, InvalidInput, NoBrowser
-from pronk_pin.viz import Film, Scene, write_film, write_png
+from pronk_pin.robot import ROBOTS, Robot, RobotSpec, load_robot
+from pronk_pin.viz import Film, Scene, Track, write_film, write_png
 from pronk_pin.viz.player.browser import VARIABLE
 
 if TYPE_CHECKING:
     from conftest import Eye
+
+HYQ = RobotSpec(
+    "hyq",
+    "hyq_description/robots/hyq_no_sensors.urdf",
+    base_link="base_link",
+    legs=("lf", "lh", "rf", "rh"),
+    joints=("haa", "hfe", "kfe"),
+    standing=(-0.2, 0.75, -1.5, -0.2, -0.75, 1.5) * 2,
+)
+"""A large robot."""
 
 PROGRAM = """
 import sys, time
@@ -40,6 +52,44 @@ def test_a_picture_shows_the_moment_asked_for(scene: Scene, browser: Eye, tmp_pa
     ]
     assert pictures[0].shape == (360, 480, 3)
     assert np.sum(np.abs(pictures[0] - pictures[1]).max(axis=-1) > 40) > 2_000
+
+
+def drawn(scene: Scene, path: Path) -> np.ndarray:
+    picture = write_png(scene, path, Film(width=480, height=400))
+    return np.asarray(Image.open(picture).convert("RGB")).astype(int)
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("spec", [*ROBOTS.values(), HYQ], ids=lambda spec: spec.name)
+def test_a_robot_is_whole_in_its_picture(spec: RobotSpec, browser: Eye, tmp_path: Path) -> None:
+    """None touches the edge, large ones neither, and all have legs down to the ground."""
+    robot = load_robot(spec)
+    q = robot.standing[None]
+    stands = drawn(Scene(robot, (Track("robot", np.zeros(1), q),)), tmp_path / "a.png")
+    low = q.copy()
+    low[0, 2] -= 30.0
+    none = drawn(Scene(robot, (Track("robot", np.zeros(1), low),)), tmp_path / "b.png")
+    rows, columns = np.nonzero(np.abs(stands - none).max(axis=-1) > 25)
+    assert 0.02 < len(rows) / stands[..., 0].size < 0.35
+    assert 20 < rows.min() < rows.max() < 395
+    assert 5 < columns.min() < columns.max() < 475
+    assert np.ptp(rows) > 100
+
+
+@pytest.mark.browser
+def test_capsules_and_cones_are_drawn(robot: Robot, browser: Eye, tmp_path: Path) -> None:
+    shapes = ('<capsule radius="0.05" length="0.3"/>', '<cone radius="0.1" length="0.4"/>')
+    pictures = []
+    for number, shape in enumerate(("", *shapes)):
+        visual = f"<visual><geometry>{shape}</geometry></visual>" if shape else ""
+        text = re.sub("<visual>.*?</visual>", "", robot.urdf.decode(), flags=re.DOTALL)
+        path = tmp_path / f"{number}.urdf"
+        path.write_text(text.replace('<link name="trunk">', f'<link name="trunk">{visual}'))
+        own = load_robot(RobotSpec("own", str(path)))
+        scene = Scene(own, (Track("robot", np.zeros(1), own.standing[None]),))
+        pictures.append(drawn(scene, tmp_path / f"{number}.png"))
+    counts = [np.sum(np.abs(each - pictures[0]).max(axis=-1) > 25) for each in pictures[1:]]
+    assert min(counts) > 1000
 
 
 @pytest.mark.browser

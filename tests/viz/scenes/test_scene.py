@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from pathlib import Path
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pronk_pin.errors import InvalidInput
+from pronk_pin.errors import FileProblem, InvalidInput, PartNotShown
 from pronk_pin.gait import Gait, GaitPhase
 from pronk_pin.kinematics import foot_positions
-from pronk_pin.robot import Robot, load_robot
+from pronk_pin.robot import Robot, RobotSpec, find_mesh, load_robot
 from pronk_pin.viz import Scene, Track, gait_scene
-from pronk_pin.viz.scenes.meshes import Appearance, Mesh, Solid, appearance, thin
+from pronk_pin.viz.scenes.mesh_files import Mesh, load_mesh, thin
+from pronk_pin.viz.scenes.meshes import Appearance, Solid, appearance
 
 
 def some_motion(robot: Robot, n: int = 40) -> np.ndarray:
@@ -206,3 +210,135 @@ def test_the_robot_is_light_and_keeps_its_size(scene: Scene) -> None:
     assert isinstance(trunk, Mesh)
     extent = np.ptp(trunk.vertices, axis=0)
     np.testing.assert_allclose(extent, [0.414, 0.194, 0.117], atol=2e-3)
+
+
+def own_visuals(robot: Robot, path: Path, *geometries: str, rgba: str = "1 0 0 1") -> Robot:
+    """The A1 whose trunk is nothing but these shapes, and whose legs are not seen."""
+    root = ElementTree.fromstring(robot.urdf)
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+        if link.get("name") == "trunk":
+            for geometry in geometries:
+                text = (
+                    f"<visual><origin xyz='0 0 0.1'/><geometry>{geometry}</geometry>"
+                    f"<material name='own'><color rgba='{rgba}'/></material></visual>"
+                )
+                link.append(ElementTree.fromstring(text))
+    path.write_bytes(ElementTree.tostring(root))
+    return load_robot(RobotSpec("own", str(path)))
+
+
+def test_capsules_and_cones_are_shown(robot: Robot, tmp_path: Path) -> None:
+    """Which the library that reads URDFs for Pinocchio does not know."""
+    own = own_visuals(
+        robot,
+        tmp_path / "own.urdf",
+        '<capsule radius="0.05" length="0.2"/>',
+        '<cone radius="0.05" length="0.2"/>',
+    )
+    assert own.mass == robot.mass
+    capsule, cone = appearance(own).parts
+    assert capsule.shape == Solid("capsule", (0.05, 0.2))
+    assert cone.shape == Solid("cone", (0.05, 0.2))
+    np.testing.assert_array_equal(capsule.placement[:3, 3], [0.0, 0.0, 0.1])
+    assert capsule.color == (1.0, 0.0, 0.0)
+
+
+def test_what_cannot_be_shown_is_left_out_with_a_warning(robot: Robot, tmp_path: Path) -> None:
+    (tmp_path / "torn.stl").write_text("solid\nfacet normal 0")
+    own = own_visuals(
+        robot,
+        tmp_path / "own.urdf",
+        '<mesh filename="package://my_robot/nowhere.stl"/>',
+        '<mesh filename="torn.stl"/>',
+        '<torus radius="0.1"/>',
+        '<box size="0.1 0.1"/>',
+        '<sphere radius="0.1"/>',
+    )
+    said = (
+        r"own is shown without trunk_0 .*my_robot.*ROS_PACKAGE_PATH.* and 3 more: trunk_1, trunk_2"
+    )
+    with pytest.warns(PartNotShown, match=said):
+        look = appearance(own)
+    assert [part.name for part in look.parts] == ["trunk_4"]
+
+
+def test_meshes_of_packages_are_found(
+    robot: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    urdf = tmp_path / "my_robot" / "urdf" / "own.urdf"
+    places = {
+        "package://my_robot/meshes/a.stl": tmp_path / "my_robot" / "meshes" / "a.stl",
+        "package://other/b.stl": tmp_path / "ros" / "other" / "b.stl",
+        "package://third/c.stl": tmp_path / "ament" / "share" / "third" / "c.stl",
+        "d.stl": urdf.parent / "d.stl",
+        f"file://{tmp_path}/e.stl": tmp_path / "e.stl",
+    }
+    for path in places.values():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"/nowhere:{tmp_path / 'ros'}")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "ament"))
+    for address, path in places.items():
+        assert find_mesh(address, urdf, urdf.parent) == path
+    with pytest.raises(FileProblem, match=r"folder named lost above the URDF, .*ROS_PACKAGE_PATH"):
+        find_mesh("package://lost/f.stl", urdf, urdf.parent)
+
+
+_TORN = [
+    ("go2_description/visuals", "base.dae"),
+    ("go2_description/visuals", "thigh.dae"),
+    ("anymal_c_simple_description/meshes", "base.dae"),
+    ("laikago_description/meshes", "trunk.obj"),
+]
+
+
+@pytest.mark.parametrize(("folder", "name"), _TORN, ids=lambda value: value)
+def test_faces_of_several_materials_span_what_their_vertices_span(folder: str, name: str) -> None:
+    path = load_robot("go2").package_dir / "example-robot-data" / "robots" / folder / name
+    read = coal.MeshLoader().load(str(path), np.ones(3))
+    everywhere = np.array(read.vertices())
+    mesh = load_mesh(path, np.ones(3))
+    assert len(mesh.faces) == read.num_tris
+    assert len(np.unique(mesh.faces)) == len(mesh.vertices)
+    for end in (np.min, np.max):
+        np.testing.assert_allclose(
+            end(mesh.vertices[mesh.faces], axis=(0, 1)), end(everywhere, axis=0), atol=1e-7
+        )
+    # Edges of a torn mesh go from one part of it to another.
+    torn = np.array([tuple(read.tri_indices(k)[c] for c in range(3)) for k in range(read.num_tris)])
+    edges = (np.diff(mesh.vertices[mesh.faces], axis=1), np.diff(everywhere[torn], axis=1))
+    own, wrong = (np.linalg.norm(edge, axis=-1).mean() for edge in edges)
+    assert own < 0.8 * wrong
+
+
+_TWO = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+  <asset><unit meter="1"/><up_axis>Z_UP</up_axis></asset>
+  <library_geometries><geometry id="g"><mesh>
+    <source id="p"><float_array id="a" count="18">0 0 0 1 0 0 0 1 0 0 0 2 1 0 2 0 1 2</float_array>
+      <technique_common><accessor source="#a" count="6" stride="3"><param name="X" type="float"/>
+      <param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common>
+    </source>
+    <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+    <triangles count="1" material="a"><input semantic="VERTEX" source="#v" offset="0"/>
+      <p>0 1 2</p></triangles>
+    <triangles count="1" material="b"><input semantic="VERTEX" source="#v" offset="0"/>
+      <p>3 4 5</p></triangles>
+  </mesh></geometry></library_geometries>
+  <library_visual_scenes><visual_scene id="s">
+    <node><instance_geometry url="#g"/></node>
+    <node><translate>10 0 0</translate><instance_geometry url="#g"/></node>
+  </visual_scene></library_visual_scenes>
+  <scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>"""
+
+
+def test_a_part_that_a_scene_has_twice_is_there_twice(tmp_path: Path) -> None:
+    (tmp_path / "two.dae").write_text(_TWO)
+    mesh = load_mesh(tmp_path / "two.dae", np.array([1.0, 1.0, 0.5]))
+    triangles = {tuple(map(tuple, mesh.vertices[face].round(9).tolist())) for face in mesh.faces}
+    corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    wanted = [corner + np.array([x, 0, z]) for x in (0.0, 10.0) for z in (0.0, 1.0)]
+    assert triangles == {tuple(map(tuple, each.tolist())) for each in wanted}

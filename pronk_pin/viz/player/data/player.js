@@ -40,6 +40,14 @@ const SOLIDS = {
   sphere: (radius) => new THREE.SphereGeometry(radius, 16, 8),
   cylinder: (radius, length) =>
     new THREE.CylinderGeometry(radius, radius, length, 16).rotateX(Math.PI / 2),  // along z
+  cone: (radius, length) => new THREE.ConeGeometry(radius, length, 16).rotateX(Math.PI / 2),
+  capsule(radius, length) {
+    const bow = Array.from({length: 9}, (_, i) => Math.PI / 16 * i);  // from a pole to the side
+    const side = bow.map((angle) => new THREE.Vector2(
+      radius * Math.sin(angle), radius * Math.cos(angle) + length / 2));
+    const outline = [...side, ...side.slice().reverse().map(({x, y}) => new THREE.Vector2(x, -y))];
+    return new THREE.LatheGeometry(outline.reverse(), 16).rotateX(Math.PI / 2);
+  },
 };
 
 function geometryOf(shape) {
@@ -451,10 +459,10 @@ class Player {
 
   // From the robots' right front; MeshCat's camera has y up.
   look() {
-    const far = 1 + 0.45 * Math.max(this.solid - 1, 0);
+    const far = this.robot.size * (1 + 0.45 * Math.max(this.solid - 1, 0));
     this.viewer.camera.position.set(0.55 * far, 0.45 * far, 0.85 * far);
     this.viewer.camera.fov = 50;
-    this.viewer.controls.target.set(0, 0.2, 0);
+    this.viewer.controls.target.set(0, 0.2 * this.robot.size, 0);
   }
 
   get solid() { return this.film.tracks.filter((track) => !track.ghost).length; }
