@@ -141,7 +141,10 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     # Robots
     "robot of nothing": (lambda: load_robot(any_value), "None is nothing; give a RobotSpec, or a"),
     "robot by a number": (lambda: load_robot(3), "robot=3 is an int; give a RobotSpec, or a name"),
-    "robot in capitals": (lambda: load_robot("A1"), "unknown robot 'A1'; choose one of: a1, go1"),
+    "robot in capitals": (
+        lambda: load_robot("A1"),
+        "unknown robot 'A1'; choose one of: a1, anymal_c, b1",
+    ),
     "robot name of two lines": (lambda: load_robot("a\n1"), "unknown robot 'a 1'; choose one of"),
     "spec name": (lambda: RobotSpec("a/b", "x.urdf"), "name='a/b' cannot be part of the name of"),
     "spec urdf": (lambda: RobotSpec("a", any_value), "urdf=None is nothing; give a text"),
@@ -674,7 +677,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["compare", "--speeds", "nan"], "speeds[0]=nan; give a number that is finite"),
     (["compare", "--controllers", "pd/ilc"], "unknown controller 'pd/ilc'; choose one of: pd, ilc"),
     (["compare", "--controllers", "pd", "pd"], "controllers must name at least one, and none of"),
-    (["compare", "--robot", ""], "unknown robot ''; choose one of: a1, go1, go2, solo12"),
+    (["compare", "--robot", ""], "unknown robot ''; choose one of: a1, anymal_c, b1, bolt"),
     (["compare", "--suite", "all"], "unknown suite 'all'; choose one of: default, knowledge"),
     (["compare", "--base", "None"], "unknown base 'None'; choose one of: locked, sagittal, free"),
     ([*SHORT, "--workers", "0"], "workers=0; give a whole number from 1 to 1024"),
@@ -707,7 +710,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["explain", "nowhere"], "nowhere: not a results folder (no config.json)"),
     ([*BUILD, "--speeds", "9"], "speed 9 m/s is out of reach of the a1: its legs and the shortest"),
     ([*BUILD, "--speeds", "0", "--apex", "5"], "apex 5 m is out of reach of the a1: its legs and"),
-    ([*BUILD, "--speeds", "0", "--apex", "0.1"], "the apex, 0.1 m, is not above the least trunk"),
+    ([*BUILD, "--speeds", "0", "--apex", "0.1"], "apex 0.1 m: the a1 stands at 0.269 m already"),
     ([*BUILD, "--speeds", "0", "--apex", "-1"], "apex=-1.0; give a number above 0"),
     (
         [*BUILD, "--speeds", "0:1e9:1e-9"],
@@ -725,7 +728,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["gaits", "show", "7"], "speed 7 m/s is outside the gait library, which covers -0.5 to 0.8"),
     (["gaits", "show", "nan"], "speed nan m/s is outside the gait library"),
     (["gaits", "show", "0.3", "--apex", "nan"], "apex nan m is outside the gait library"),
-    (["gaits", "show", "--robot", "solo12"], "build one with 'pronk-pin gaits build --robot solo1"),
+    (["gaits", "show", "--robot", "bolt", "--base", "sagittal"], "build one with 'pronk-pin gaits"),
     (["gaits", "show", "--library", "no.npz"], "no.npz: missing; make it again with"),
     (["gaits", "plot", "7"], "speed 7 m/s is outside the gait library"),
     (["gaits", "plot", "--format", "bmp"], "figures cannot be written as 'bmp'; choose png, svg"),

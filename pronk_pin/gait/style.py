@@ -8,7 +8,7 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from .._checks import known_name, real, sequence_of, shown, text
+from .._checks import Interval, known_name, real, sequence_of, shown, text
 from ..errors import InvalidInput
 from ..robot import (
     Base,
@@ -108,7 +108,7 @@ def gait_problem(
     }
     _check_changes(changes)
     options, stands = defaults | changes, float(robot.standing[2])
-    if not real("apex", options["apex"]) > stands:
+    if not real("apex", options["apex"], Interval(0, 100, "m", above=True)) > stands:
         raise InvalidInput(
             f"apex {options['apex']:g} m: the {robot.name} stands at {stands:.3g} m already; give "
             f"more, as {apex:g} m, or none for that"

@@ -234,8 +234,8 @@ def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixt
         (["gaits", "build", "--workers", "0"], "workers=0; give a whole number from 1"),
         (["gaits", "show", "0.1", "--apex", "0.5"], "which covers 0.32 to 0.36 m"),
         (
-            ["gaits", "show", "--robot", "solo12"],
-            "solo12.npz: no such gait library is shipped",
+            ["gaits", "show", "--robot", "solo12", "--gait", "bound"],
+            "solo12-bound.npz: no such gait library is shipped",
         ),
         (["gaits", "plot", "--format", "bmp"], "choose png, svg, pdf"),
         (["gaits", "plot", "--apex", "0.5"], "no apex 0.5; choose one of: 0.32, 0.34, 0.36"),

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -346,7 +347,8 @@ def test_values_by_joint_are_kept_as_they_were_given(tmp_path: Path) -> None:
     assert (described["armature"], described["torque_constant"]) == (0.0, [1.0, 0.9, 0.8])
     assert restore(described, Scenario, "it") == LEGS
     assert Scenario.from_json(LEGS.to_json()) == LEGS
-    assert isinstance(describe(load_scenario("nominal"))["armature"], float)
+    assert isinstance(describe(load_scenario("ideal"))["armature"], float)
+    assert describe(load_scenario("nominal"))["armature"] is None  # the robot's motors'
     path = tmp_path / "mine.yaml"
     path.write_text("scenarios: [{name: legs, armature: [0.01, 0.02, 0.03], damping: 0.1}]")
     by_hand = read_config(path).scenario("legs")
@@ -387,9 +389,9 @@ def test_gaits_and_robots_of_ones_own(
 ) -> None:
     """A robot from TOML with the A1's URDF, and gaits of that name, end to end from the shell."""
     spec = ROBOTS["a1"]
-    (tmp_path / "robot.toml").write_text(
-        f'name = "twin"\nurdf = "{spec.urdf}"\nrotors = {list(spec.rotors)}\n'
-    )
+    shipped = resources.files("pronk_pin.robot") / "specs" / "a1.toml"
+    text = shipped.read_text().replace('name = "a1"', 'name = "twin"')
+    (tmp_path / "robot.toml").write_text(text)
     robot = RobotSpec.load(tmp_path / "robot.toml")
     assert robot == replace(spec, name="twin")
     with pytest.raises(FileProblem, match="no such gait library is shipped"):
