@@ -18,6 +18,9 @@ from ..experiment import Cell, Experiment
 CELLS = ("controller", "scenario", "seed", "speed")
 """Dimensions along which the cells lie; those of a quantity itself follow."""
 
+_CURVES = {"phase", "tick"}
+"""What has none of these dimensions takes little memory, and is read at once."""
+
 _COMMON = ("robot", "base", "mjcf", "mjcf_sha256", "timestep", "switch")
 """Attributes of the cells that the whole has, too, where all cells agree."""
 
@@ -40,6 +43,7 @@ class CellArray(xr.backends.BackendArray):
         name: Name of the quantity.
         places: The cells that are there.
         open: Opens the strides of a cell.
+        kept: Its values in the cells, where they were read already; None where they are not.
         shape: Its shape, the four dimensions of `CELLS` first.
         dtype: Its type, a floating one.
     """
@@ -49,12 +53,14 @@ class CellArray(xr.backends.BackendArray):
         name: str,
         places: Mapping[Cell, Place],
         open: Opener,
+        kept: Mapping[Cell, npt.NDArray[Any]] | None,
         shape: tuple[int, ...],
         dtype: np.dtype[Any],
     ) -> None:
         self.name = name
         self.places = places
         self.open = open
+        self.kept = kept
         self.shape = shape
         self.dtype = dtype
 
@@ -74,10 +80,9 @@ class CellArray(xr.backends.BackendArray):
             columns = np.flatnonzero(np.isin(wanted[3], speeds))
             if not columns.size or not all(of.size for of in rows):
                 continue
-            with _LOCK, self.open(cell) as file:
-                if self.name not in file:
-                    continue
-                values = file[self.name].transpose("speed", ...).to_numpy()
+            values = self._of(cell)
+            if values is None:
+                continue
             for column in columns:
                 row = values[int(np.flatnonzero(speeds == wanted[3][column])[0])]
                 whole[...] = np.nan
@@ -86,6 +91,17 @@ class CellArray(xr.backends.BackendArray):
                 for place in itertools.product(*rows):
                     found[(*place, column)] = part
         return found[tuple(0 if isinstance(of, int | np.integer) else slice(None) for of in key)]
+
+    def _of(self, cell: Cell) -> npt.NDArray[Any] | None:
+        """The quantity in a cell, speeds first; None if it has no such."""
+        if self.kept is not None:
+            return self.kept.get(cell)
+        with _LOCK, self.open(cell) as file:
+            return _values(file[self.name]) if self.name in file else None
+
+
+def _values(quantity: xr.DataArray) -> npt.NDArray[Any]:
+    return np.asarray(quantity.transpose("speed", ...).to_numpy())
 
 
 def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> xr.Dataset:
@@ -105,6 +121,7 @@ def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> x
     places: dict[Cell, Place] = {}
     sizes: dict[Hashable, int] = {}
     quantities: dict[Hashable, xr.Variable] = {}
+    kept: dict[Hashable, dict[Cell, npt.NDArray[Any]]] = {}
     coordinates: dict[Hashable, xr.Variable] = {}
     attributes: list[Mapping[Any, Any]] = []
     for cell in cells:
@@ -119,6 +136,8 @@ def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> x
                 sizes[dim] = max(size, sizes.get(dim, 0))
             for name, values in file.data_vars.items():
                 quantities.setdefault(name, values.variable)
+                if not _CURVES.intersection(map(str, values.dims)):
+                    kept.setdefault(name, {})[cell] = _values(values)
             for name, values in file.coords.items():
                 if name != "speed" and values.size == sizes[values.dims[0]]:
                     coordinates[name] = values.load().variable
@@ -129,10 +148,10 @@ def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> x
         dims = (*CELLS, *(dim for dim in quantity.dims if dim != "speed"))
         shape = tuple(sizes[dim] for dim in dims)
         dtype = np.result_type(quantity.dtype, np.float32)  # NaN for counts, too
-        array = CellArray(str(name), places, open, shape, dtype)
+        array = CellArray(str(name), places, open, kept.get(name), shape, dtype)
         lazy: Any = indexing.LazilyIndexedArray(array)
-        kept = indexing.MemoryCachedArray(lazy)  # type: ignore[no-untyped-call]
-        variables[name] = xr.Variable(dims, kept, quantity.attrs)
+        cached = indexing.MemoryCachedArray(lazy)  # type: ignore[no-untyped-call]
+        variables[name] = xr.Variable(dims, cached, quantity.attrs)
     joined = xr.Dataset(variables, {**coordinates, **labels})
     joined["speed"].attrs["units"] = "m/s"
     found = {name: {each[name] for each in attributes if name in each} for name in _COMMON}

@@ -245,10 +245,10 @@ class Results(Displayed):
         What there is not is NaN: strides and ticks after the end of a shorter simulation, and cells
         that are not there yet. Speeds that were added later lie among the others.
 
-        A quantity is read when it is asked for, of those cells that are asked for, and kept then,
-        as `xarray.open_dataset` does. `dataset().nbytes` is the memory of everything at once: 0.3
-        GB for the default comparison, where `peak_error` has 1 MB. Select before you compute, and
-        `load()` no more than fits.
+        Numbers of strides are read at once. Curves over `phase` and `tick` are read when they are
+        asked for, of those cells that are asked for, and kept then, as `xarray.open_dataset` does.
+        `dataset().nbytes` is the memory of everything: 0.3 GB for the default comparison, of which
+        the numbers are 5 MB. Select before you compute, and `load()` no more than fits.
 
         Raises:
             FileProblem: No strides are there yet, or a file is damaged or of another simulation.
