@@ -68,6 +68,11 @@ HIP = r'(<joint name="FL_hip_joint".*?)'
             r'\1lower="2"',
             "joint FL_hip_joint: its lower limit, 2, is above",
         ),
+        (
+            HIP + r'lower="[^"]+" upper="[^"]+"',
+            r'\1lower="0.1" upper="0.1"',
+            "joint FL_hip_joint: both its limits are 0.1, so that it cannot move",
+        ),
         (HIP + r'lower="[^"]+"', r'\1lower="low"', r'joint FL_hip_joint: <limit lower="low">'),
         (HIP + r'effort="[^"]+"', r'\1effort="-3"', "joint FL_hip_joint: its limits of effort"),
         (HIP + r'velocity="[^"]+"', r"\1", "joint FL_hip_joint: <limit> has no velocity"),
@@ -152,6 +157,29 @@ def test_what_xacro_leaves_behind_is_no_fault(written: Write, robot: Robot) -> N
 
 
 WORLD = '<link name="{0}"/><joint name="to_base" type="{1}"><parent link="{0}"/><child link="{2}"/>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"FL_foot_fixed"', '"FL_foot"'),
+        ('"floating_base"', '"trunk"'),
+        ('<robot name="a1"', "<robot"),
+        ("(<robot )", "<?xml version='1.0' encoding='ISO-8859-1'?><!-- é -->\\1"),
+    ],
+    ids=["a joint as its foot", "a joint as the trunk", "no name", "in Latin 1"],
+)
+def test_names_and_letters_that_are_unusual_are_no_fault(
+    robot: Robot, tmp_path: Path, old: str, new: str
+) -> None:
+    path = tmp_path / "own.urdf"
+    text = robot.urdf.decode()
+    text = text[text.index("<robot") :]
+    assert re.search(old, text)
+    path.write_bytes(re.sub(old, new, text).encode("latin-1"))
+    own = load_robot(RobotSpec("own", str(path)))
+    np.testing.assert_array_equal(own.standing, robot.standing)
+    assert compare_models(own, mujoco_spec(own).compile(), states=2).agrees
 
 
 @pytest.mark.parametrize("root", ["world", "odom"])
