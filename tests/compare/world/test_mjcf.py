@@ -376,3 +376,24 @@ def test_meshes_that_are_only_seen_may_be_missing_in_every_comparison(
     # Armature apart, which our robot has not.
     assert "mass" not in {row.what for row in parity.differences}
     assert parity.jacobian == pytest.approx(0.0, abs=1e-5)
+
+
+def test_legs_may_hang_from_what_is_welded_to_the_trunk(robot: Robot, tmp_path: Path) -> None:
+    def mount(root: ElementTree.Element) -> None:
+        trunk = root.find("worldbody/body")
+        assert trunk is not None
+        legs = trunk.findall("body")
+        mounted = ElementTree.SubElement(trunk, "body", name="mount", pos="0 0 0.1")
+        frame = ElementTree.SubElement(mounted, "frame", pos="0 0 -0.1")
+        for leg in legs:
+            trunk.remove(leg)
+            frame.append(leg)
+
+    path = mjcf(robot, tmp_path / "mounted.xml", mount)
+    model = build_model(robot, replace(IDEAL, mjcf=str(path)), base="free")
+    parity = compare_models(robot, model, states=5, tolerance=SIX_DIGITS)
+    assert (
+        not {row.what for row in parity.differences}
+        - {"armature", "damping", "friction"}
+        - {"torque limits"}
+    )
