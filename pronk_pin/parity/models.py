@@ -319,7 +319,8 @@ def _model_name(model: mujoco.MjModel) -> str:
 
 def _read_file(path: Path) -> Mechanism:
     """Read a URDF by Pinocchio or an MJCF by MuJoCo, as its first element tells."""
-    root = read_xml(path, _GIVE).tag
+    # A file that is xacro may be no XML; who reads URDFs says so.
+    root = "robot" if path.suffix == ".xacro" else read_xml(path, _GIVE).tag
     if root == "robot":
         return read_pinocchio(read_urdf(path).model, f"{path} (Pinocchio)")
     if root != "mujoco":

@@ -33,6 +33,7 @@ from .robot_spec import (
     ROBOTS,
     RobotSpec,
     check_names,
+    frame_id,
     load_robot_spec,
     locate,
     place_feet,
@@ -152,7 +153,7 @@ class Robot(Displayed):
         centres = [name + CENTRE for name in self.foot_names]
         names = zip(centres, self.foot_names, strict=True)
         return tuple(
-            int(self.model.getFrameId(centre if self.model.existFrame(centre) else name))
+            frame_id(self.model, centre if self.model.existFrame(centre) else name)
             for centre, name in names
         )
 

@@ -211,7 +211,7 @@ def check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:
     for leg, name in zip(spec.legs, spec.foot_names, strict=True):
         if not model.existFrame(name):
             raise InvalidInput(f"{path.name} has no frame {name}; adapt foot_pattern")
-        mover = model.names[model.frames[model.getFrameId(name)].parentJoint]
+        mover = model.names[model.frames[frame_id(model, name)].parentJoint]
         if mover != spec.leg_joints(leg)[-1]:
             raise InvalidInput(
                 f"{path.name}: foot {name} is moved by joint {mover}, and not by "
@@ -219,12 +219,18 @@ def check_names(spec: RobotSpec, model: pin.Model, path: Path) -> None:
             )
     if not model.existFrame(spec.base_link):
         raise InvalidInput(f"{path.name} has no link {spec.base_link}; adapt base_link")
-    mover = model.names[model.frames[model.getFrameId(spec.base_link)].parentJoint]
+    mover = model.names[model.frames[frame_id(model, spec.base_link)].parentJoint]
     if mover in joints:
         raise InvalidInput(
             f"{path.name}: link {spec.base_link} is moved by joint {mover}; adapt base_link, which "
             "is the link that floats"
         )
+
+
+def frame_id(model: pin.Model, name: str) -> int:
+    """Pinocchio's id of the frame of a link, or of a joint where no link has that name."""
+    link = model.existFrame(name, pin.BODY)
+    return int(model.getFrameId(name, pin.BODY) if link else model.getFrameId(name))
 
 
 def place_feet(spec: RobotSpec, document: ElementTree.Element, model: pin.Model) -> float:
@@ -254,7 +260,7 @@ def place_feet(spec: RobotSpec, document: ElementTree.Element, model: pin.Model)
         radii.append(float(numbers_of(sphere, "radius", None, 1)[0]))
         centre = placement_of(shape).translation
         if np.any(centre):
-            parent = model.getFrameId(foot)
+            parent = frame_id(model, foot)
             joint, place = model.frames[parent].parentJoint, model.frames[parent].placement
             place = place * pin.SE3(np.eye(3), centre)
             model.addFrame(

@@ -168,6 +168,10 @@ def _check_joint(joint: ElementTree.Element) -> None:
     )
     if lower > upper:
         raise InvalidInput(f"its lower limit, {lower:g}, is above its upper one, {upper:g}")
+    if lower == upper and not _is_endless(joint):
+        raise InvalidInput(
+            f"both its limits are {lower:g}, so that it cannot move; make it fixed, or give limits"
+        )
     if min(effort, velocity) < 0.0:
         raise InvalidInput("its limits of effort and velocity are none: one is negative")
 
@@ -228,10 +232,10 @@ def endless_joints(root: ElementTree.Element) -> list[ElementTree.Element]:
 
     urdfdom takes an angle that is not given for 0, so that such a joint could not move at all.
     """
-    found = []
-    for joint in root.findall("joint"):
-        limit, kind = joint.find("limit"), joint.get("type")
-        given = limit is not None and not {"lower", "upper"}.isdisjoint(limit.keys())
-        if kind == "continuous" or (kind == "revolute" and not given):
-            found.append(joint)
-    return found
+    return [joint for joint in root.findall("joint") if _is_endless(joint)]
+
+
+def _is_endless(joint: ElementTree.Element) -> bool:
+    limit = joint.find("limit")
+    given = limit is not None and not {"lower", "upper"}.isdisjoint(limit.keys())
+    return joint.get("type") == "continuous" or (joint.get("type") == "revolute" and not given)

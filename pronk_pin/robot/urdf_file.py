@@ -112,7 +112,6 @@ def read_urdf(path: Path) -> Urdf:
         raise FileProblem(path, f"not a usable URDF ({error})", _CHECK) from error
     said: list[str] = []
     try:
-        data.decode()  # what others call reads UTF-8 only
         endless = endless_joints(root)
         with _overheard(said):
             model = pin.buildModelFromXML(_mechanism(root), pin.JointModelFreeFlyer())
@@ -143,7 +142,7 @@ def _xacro(path: Path) -> FileProblem:
 def _mechanism(root: ElementTree.Element) -> str:
     """The document without shapes and colours, whose faults are none of the mechanism; continuous
     joints are revolute ones, so that q has an angle for each."""
-    mechanism = ElementTree.Element(root.tag, root.attrib)
+    mechanism = ElementTree.Element(root.tag, {"name": "robot", **root.attrib})
     for link in root.findall("link"):
         own = ElementTree.SubElement(mechanism, "link", link.attrib)
         own.extend(link.findall("inertial"))

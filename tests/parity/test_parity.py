@@ -387,6 +387,20 @@ def test_an_inertia_that_no_body_can_have_is_named(
         mujoco_spec(own)
 
 
+def test_xacro_is_told_from_a_urdf(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "a1.urdf.xacro"
+    path.write_text(robot.urdf.decode().replace("</robot>", "<xacro:leg/></robot>"))
+    with pytest.raises(FileProblem, match="this is xacro"):
+        compare_models(robot, path)
+
+
+def test_a_limit_of_no_torque_is_one(robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "limp.urdf"
+    path.write_text(robot.urdf.decode().replace('effort="33.5"', 'effort="0"'))
+    rows = compare_models(robot, path, states=2).rows
+    assert {row.b for row in rows if row.what == "torque limits"} == {(0.0, 0.0)}
+
+
 def test_urdfs_are_compared_without_knowing_their_feet(robot: Robot, tmp_path: Path) -> None:
     path = tmp_path / "other.urdf"
     path.write_text(robot.urdf_path.read_text().replace('velocity="21"', 'velocity="30"', 1))

@@ -8,11 +8,21 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from pronk_pin import RobotSpec, load_robot
+from pronk_pin.dynamics import stance_derivatives, stance_dynamics
 from pronk_pin.errors import FileProblem, InvalidInput
-from pronk_pin.kinematics import foot_positions, inverse_kinematics, leg_inverse_kinematics
+from pronk_pin.kinematics import (
+    Contact,
+    contact_bias,
+    contact_jacobian,
+    foot_positions,
+    inverse_kinematics,
+    leg_inverse_kinematics,
+    leg_odometry,
+)
 from pronk_pin.parity import compare_models
 from pronk_pin.robot import Robot
 from pronk_pin.robot.formats import mujoco_spec
@@ -57,6 +67,11 @@ HIP = r'(<joint name="FL_hip_joint".*?)'
             HIP + r'lower="[^"]+"',
             r'\1lower="2"',
             "joint FL_hip_joint: its lower limit, 2, is above",
+        ),
+        (
+            HIP + r'lower="[^"]+" upper="[^"]+"',
+            r'\1lower="0.1" upper="0.1"',
+            "joint FL_hip_joint: both its limits are 0.1, so that it cannot move",
         ),
         (HIP + r'lower="[^"]+"', r'\1lower="low"', r'joint FL_hip_joint: <limit lower="low">'),
         (HIP + r'effort="[^"]+"', r'\1effort="-3"', "joint FL_hip_joint: its limits of effort"),
@@ -144,6 +159,29 @@ def test_what_xacro_leaves_behind_is_no_fault(written: Write, robot: Robot) -> N
 WORLD = '<link name="{0}"/><joint name="to_base" type="{1}"><parent link="{0}"/><child link="{2}"/>'
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"FL_foot_fixed"', '"FL_foot"'),
+        ('"floating_base"', '"trunk"'),
+        ('<robot name="a1"', "<robot"),
+        ("(<robot )", "<?xml version='1.0' encoding='ISO-8859-1'?><!-- é -->\\1"),
+    ],
+    ids=["a joint as its foot", "a joint as the trunk", "no name", "in Latin 1"],
+)
+def test_names_and_letters_that_are_unusual_are_no_fault(
+    robot: Robot, tmp_path: Path, old: str, new: str
+) -> None:
+    path = tmp_path / "own.urdf"
+    text = robot.urdf.decode()
+    text = text[text.index("<robot") :]
+    assert re.search(old, text)
+    path.write_bytes(re.sub(old, new, text).encode("latin-1"))
+    own = load_robot(RobotSpec("own", str(path)))
+    np.testing.assert_array_equal(own.standing, robot.standing)
+    assert compare_models(own, mujoco_spec(own).compile(), states=2).agrees
+
+
 @pytest.mark.parametrize("root", ["world", "odom"])
 def test_what_a_floating_joint_ties_to_a_root_without_mass_is_the_base(
     written: Write, robot: Robot, root: str
@@ -217,6 +255,38 @@ def test_the_sphere_of_a_foot_has_a_place(robot: Robot, tmp_path: Path) -> None:
     assert compare_models(own, model, states=3).agrees
     heavier = own.with_parameters(type(own.parameters)(payload=1.0))
     np.testing.assert_array_equal(heavier.standing, own.standing)
+
+
+@pytest.mark.parametrize("contact", ["point", "rolling"])
+def test_a_sphere_beside_its_link_is_one_whose_link_is_there(
+    robot: Robot, tmp_path: Path, contact: Contact
+) -> None:
+    """The same robot, written in two ways."""
+    text = robot.urdf.decode()
+    own = with_places(robot, tmp_path / "own.urdf", *["0.005 0 0.0125"] * 4)
+    for leg in robot.legs:
+        joint = rf'(name="{leg}_foot_fixed".*?xyz=)"0 0 -0.2"'
+        text = re.sub(joint, r'\1"0.005 0 -0.1875"', text, flags=re.DOTALL)
+        link = rf'(<link name="{leg}_foot">.*?<inertial>)'
+        text = re.sub(link, r'\1<origin xyz="-0.005 0 -0.0125"/>', text, flags=re.DOTALL)
+    (tmp_path / "moved.urdf").write_text(text)
+    same = load_robot(RobotSpec("own", str(tmp_path / "moved.urdf")))
+    np.testing.assert_allclose(same.standing, own.standing, atol=1e-12)
+    rng = np.random.default_rng(0)
+    q = pin.integrate(own.model, own.standing, 0.3 * rng.normal(size=18))
+    v, tau = rng.normal(size=18), rng.normal(size=12)
+    found = [
+        (
+            contact_jacobian(each, q, contact=contact),
+            contact_bias(each, q, v, contact=contact),
+            leg_odometry(each, q, v, contact=contact),
+            *stance_dynamics(each, q, v, tau, feet=("FL", "RR"), contact=contact)[:2],
+            *stance_derivatives(each, q, v, tau, feet=("FL", "RR"), contact=contact)[:3],
+        )
+        for each in (own, same)
+    ]
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-8 * max(1.0, np.abs(one).max()))
 
 
 def test_feet_of_several_sizes_or_none_are_named(written: Write) -> None:

@@ -125,6 +125,22 @@ def _add_heights(spec: mujoco.MjSpec, heights: Array) -> mujoco.MjsGeom:
     return spec.worldbody.add_geom(type=kind, hfieldname=field.name, pos=[0, 0, low])
 
 
+def check_feet(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Check that the feet of the robot's own URDF are as large as the robot says.
+
+    Raises:
+        InvalidInput: They are not.
+    """
+    for foot in robot.foot_names:
+        radius = float(spec.geom(foot).size[0])
+        if abs(radius - robot.foot_radius) > 1e-9:
+            raise InvalidInput(
+                f"{robot.name}: foot_radius is {robot.foot_radius:g} m, and the collision sphere "
+                f"of foot {foot} has {radius:g} m; leave foot_radius out of the RobotSpec, or "
+                "correct one of them"
+            )
+
+
 def name_feet(spec: mujoco.MjSpec, robot: Robot) -> None:
     """Name the sphere that each foot stands on; one of our own where the robot has a mesh instead.
 

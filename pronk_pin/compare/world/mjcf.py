@@ -147,6 +147,8 @@ def _trunk(spec: mujoco.MjSpec, robot: Robot, path: Path) -> mujoco.MjsBody:
             "nothing would hold them: remove them"
         )
     trunk = spec.joint(robot.joint_names[0]).parent.parent
+    while not trunk.joints and trunk.parent is not None and trunk.parent.name != "world":
+        trunk = trunk.parent  # which the leg is mounted on by bodies that are welded to it
     floating = [joint.type for joint in trunk.joints] == [_FREE]
     if trunk.parent is None or trunk.parent.name != "world" or not floating:
         raise InvalidInput(

@@ -23,7 +23,7 @@ from ...control import Gains
 from ...errors import InvalidInput
 from ...robot import BASES, Robot, as_robot
 from ...robot.formats import mujoco_spec
-from .ground import add_ground, name_feet
+from .ground import add_ground, check_feet, name_feet
 from .mjcf import mjcf_spec
 from .motors import push_force
 from .payload import apply_payload
@@ -74,6 +74,8 @@ def build_model(
     apply_payload(trunk, scenario)
     _add_motors(spec, robot, scenario, servo)
     name_feet(spec, robot)
+    if not scenario.mjcf:
+        check_feet(spec, robot)
     add_ground(spec, robot, scenario)
     return _edited(spec, scenario) if scenario.edit else spec.compile()
 

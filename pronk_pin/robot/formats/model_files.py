@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from ...storage import write_file
 from ..robot import Robot
+from ..robot_spec import frame_id
 from .urdf import link_inertia, mujoco_spec, set_body_inertia, set_link_inertia
 
 _COULOMB_TIME = 0.002
@@ -75,7 +76,7 @@ def write_urdf(robot: Robot, path: Path | str, notes: Sequence[str] = ()) -> Pat
     root = ElementTree.fromstring(robot.urdf)
     bare = robot.bare or robot
     added = _parameters(robot.model.inertias[1]) - _parameters(bare.model.inertias[1])
-    frame = robot.model.frames[robot.model.getFrameId(robot.spec.base_link)].placement
+    frame = robot.model.frames[frame_id(robot.model, robot.spec.base_link)].placement
     link = next(e for e in root.findall("link") if e.get("name") == robot.spec.base_link)
     own = link_inertia(link)
     in_trunk = np.zeros(10) if own is None else _parameters(frame.act(own))

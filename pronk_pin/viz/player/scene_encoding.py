@@ -38,6 +38,7 @@ def robot_blob(scene: Scene) -> bytes:
                     "parent": joint.parent,
                     "placement": _matrix(joint.placement),
                     "axis": joint.axis.tolist(),
+                    "slides": joint.slides,
                 }
                 for joint in look.joints
             ],

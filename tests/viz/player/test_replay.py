@@ -15,7 +15,7 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin.errors import FileProblem, InvalidInput
-from pronk_pin.robot import Robot
+from pronk_pin.robot import Robot, RobotSpec, load_robot
 from pronk_pin.viz import Menu, Scene, Track, write_replay
 from pronk_pin.viz.player import replay as module
 
@@ -225,9 +225,15 @@ def test_what_was_chosen_is_shown_and_what_is_missing_is_told(
 
 
 @pytest.mark.browser
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "continuous"])
 def test_the_page_places_the_robot_as_pinocchio_does(
-    robot: Robot, browser: Eye, tmp_path: Path
+    robot: Robot, browser: Eye, tmp_path: Path, kind: str
 ) -> None:
+    if kind != "revolute":
+        thigh = 'name="FL_thigh_joint" type='
+        text = robot.urdf.decode().replace(f'{thigh}"revolute"', f'{thigh}"{kind}"')
+        (tmp_path / "own.urdf").write_text(text)
+        robot = load_robot(RobotSpec("own", str(tmp_path / "own.urdf")))
     rng = np.random.default_rng(8)
     ends = [pin.integrate(robot.model, robot.standing, rng.uniform(-0.6, 0.6, 18)) for _ in "ab"]
     track = Track("robot", np.array([0.0, 1.0]), np.stack(ends))

@@ -83,6 +83,7 @@ class Figure {
     for (const joint of robot.joints) {
       const node = fixed(new THREE.Group(), joint.placement);
       node.rest = node.quaternion.clone();
+      node.place = node.position.clone();
       node.axis = new THREE.Vector3(...joint.axis);
       (this.nodes[joint.parent] || this.group).add(node);
       this.nodes.push(node);
@@ -139,9 +140,14 @@ class Figure {
     const base = this.nodes[1], q = row.q;
     base.position.set(q[0], q[1], q[2]);
     base.quaternion.set(q[3], q[4], q[5], q[6]).normalize();
-    const turn = new THREE.Quaternion();
+    const turn = new THREE.Quaternion(), way = new THREE.Vector3();
     this.robot.joints.forEach((joint, i) => {
       const node = this.nodes[i + 2];
+      if (joint.slides) {
+        way.copy(node.axis).applyQuaternion(node.rest);
+        node.position.copy(node.place).addScaledVector(way, q[7 + i]);
+        return;
+      }
       node.quaternion.copy(node.rest).multiply(turn.setFromAxisAngle(node.axis, q[7 + i]));
     });
     const visible = !this.track.ghost || $("ghosts").checked;
