@@ -82,8 +82,14 @@ def _switched(strides: xr.Dataset) -> BoolArray:
     return np.asarray(start > float(strides.attrs["switch"]) - early)
 
 
+def of_first_leg(values: xr.DataArray | xr.Dataset, kind: str) -> str:
+    """Name of a joint of the first leg, FL of the A1, by its place in the leg: hip, thigh, calf."""
+    legs, kinds = values["leg"].to_numpy(), values["kind"].to_numpy()
+    return str(values["joint"].to_numpy()[(legs == legs[0]) & (kinds == kind)][0])
+
+
 def by_joint(values: xr.DataArray) -> xr.DataArray:
-    """Mean over the four legs: the axis `joint` of twelve becomes one of hip, thigh, calf."""
+    """Mean over the legs: the axis `joint` of twelve becomes one of hip, thigh, calf."""
     kinds = values["kind"].to_numpy()
     values = values.drop_vars(["leg", "kind"], errors="ignore")
     means = [values.isel(joint=np.flatnonzero(kinds == kind)).mean("joint") for kind in JOINTS]

@@ -13,15 +13,12 @@ import pandas as pd
 import xarray as xr
 
 from ...robot import JOINTS
-from ..metrics import by_joint, mean_interval, robots, steady, table_1
+from ..metrics import by_joint, mean_interval, of_first_leg, robots, steady, table_1
 from ..report import SHOWN, number
 from ..results import Results
 
 _SETTLED = 0.05
 """Time after which the touchdown transient is over [s]."""
-
-_LEG = "FL"
-"""The leg of the paper's Fig. 3."""
 
 VARIABLES = (
     *("count", "start", "learning", "planned_duration", "error"),
@@ -35,7 +32,8 @@ def _legs(values: xr.DataArray) -> xr.DataArray:
 
 
 def _front_left(values: xr.DataArray) -> xr.DataArray:
-    joints = values.sel(joint=[f"{_LEG}_{joint}" for joint in JOINTS])
+    """The leg of the paper's Fig. 3."""
+    joints = values.sel(joint=[of_first_leg(values, joint) for joint in JOINTS])
     return joints.assign_coords(joint=list(JOINTS)).mean("stride")
 
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ...compare import Explanation
 from ...compare.identification import discrepancy
+from ...compare.metrics import of_first_leg
 from ..figure_style import new_figure, save_figure, styled
 
 COLORS = {
@@ -26,7 +27,6 @@ COLORS = {
 }
 """Colour of a cause, of Okabe and Ito; grey is no term, and yellow nothing explains."""
 _JOINTS = ("thigh", "calf")
-_LEG = "FL"
 
 
 @styled
@@ -72,9 +72,9 @@ def write_explanation_figure(
 
 def _stacked(axes: Axes, explanation: Explanation, speed: float, part: str, joint: str) -> None:
     """Causes stacked from zero, those that push up above and those that push down below."""
-    name = f"{_LEG}_{joint}"
-    at = {"speed": speed, "part": part, "joint": name}
     shares = explanation.shares
+    name = of_first_leg(shares, joint)
+    at = {"speed": speed, "part": part, "joint": name}
     phase = shares["phase"].to_numpy()
     whole = discrepancy(shares).sel(at).to_numpy()
     finite = np.isfinite(whole)
@@ -90,7 +90,7 @@ def _stacked(axes: Axes, explanation: Explanation, speed: float, part: str, join
     axes.plot(phase, whole, color="black", lw=1.4, label="learned - model")
     axes.axhline(0.0, color="0.3", lw=0.5)
     axes.set_xlim(0.0, 1.0)
-    axes.set_title(f"{joint}, {_LEG}, {part}", fontsize=9)
+    axes.set_title(f"{name}, {part}", fontsize=9)
 
 
 def _parameters(axes: Axes, explanation: Explanation) -> None:

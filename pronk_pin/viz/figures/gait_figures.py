@@ -15,8 +15,8 @@ from matplotlib.gridspec import GridSpec
 
 from ..._typing import Array
 from ...gait import Gait, GaitLibrary, Motion
-from ...kinematics import foot_positions
-from ...robot import JOINTS, NB, Robot, load_robot
+from ...kinematics import foot_positions, mirror
+from ...robot import JOINTS, NB, Robot, length_scale, load_robot
 from ..figure_style import ACCENT, SEQUENTIAL, known_format, new_figure, save_figure, styled
 
 _SAMPLES = 81
@@ -78,8 +78,8 @@ def stride_figure(library: GaitLibrary, robot: Robot) -> Figure:
     speeds = library.speeds
     norm = Normalize(float(speeds[0]), float(max(speeds[-1], speeds[0] + 1e-3)))
     colors = colormaps[SEQUENTIAL]
-    axes = _axes(figure, grid, pitch=library.base == "sagittal")
-    left = [i for i, leg in enumerate(robot.legs) if leg.endswith("L")]
+    left = [leg for leg, _ in mirror(robot).pairs]
+    axes = _axes(figure, grid, _PAIRS[: len(left)], pitch=library.base == "sagittal")
     for gait in library.gaits:
         color, start = colors(norm(gait.speed)), 0.0
         for phase in gait.phases:
@@ -89,7 +89,7 @@ def stride_figure(library: GaitLibrary, robot: Robot) -> Figure:
                 if key in axes:
                     axes[key].plot(t, values, color=color, lw=1.0)
             start += phase.duration
-    _phases(axes, library)
+    _phases(axes, library, robot)
     for key, panel in axes.items():
         _limits(panel, key, robot)
     mappable = ScalarMappable(norm, colors)
@@ -116,7 +116,8 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
     figure = new_figure(11.0, 2.5)
     axes = figure.subplots()
     times = np.linspace(0.0, gait.duration, _FRAMES, endpoint=False)
-    spread = 0.62  # m between two poses, on top of how far the robot went
+    size = length_scale(robot)
+    spread = 0.62 * size  # m between two poses, on top of how far the robot went
     colors = colormaps[SEQUENTIAL](np.linspace(0.0, 0.85, _FRAMES))
     for frame, time in enumerate(times):
         motion, name = _at(gait, robot, float(time))
@@ -124,7 +125,7 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
         _pose(axes, robot, motion, shift, colors[frame])
         axes.annotate(
             f"{1e3 * time:.0f} ms\n{name}",
-            (motion.q[0, 0] + shift, -0.05),
+            (motion.q[0, 0] + shift, -0.05 * size),
             ha="center",
             va="top",
             fontsize=8,
@@ -141,8 +142,8 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
     axes.plot(x, trunk[drawn, 1], ":", color="0.5", lw=1.0, label="trunk")
     axes.axhline(0.0, color="0.3", lw=1.0)
     axes.set_aspect("equal")
-    axes.set_ylim(-0.19, 0.42)
-    axes.set_yticks([0.0, 0.2, 0.4])
+    axes.set_ylim(-0.19 * size, 0.42 * size)
+    axes.set_yticks(np.round([0.0, 0.2 * size, 0.4 * size], 1))
     axes.set_xticks([])
     axes.set_ylabel("height [m]")
     axes.set_title(
@@ -153,10 +154,12 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
     return figure
 
 
-def _axes(figure: Figure, grid: GridSpec, *, pitch: bool) -> dict[str, Axes]:
+def _axes(
+    figure: Figure, grid: GridSpec, pairs: tuple[str, ...], *, pitch: bool
+) -> dict[str, Axes]:
     """One panel a quantity, by its key."""
     axes: dict[str, Axes] = {}
-    for column, pair in enumerate(_PAIRS):
+    for column, pair in enumerate(pairs):
         for row, joint in enumerate(JOINTS):
             angle, torque = f"{pair} {joint} angle", f"{pair} {joint} torque"
             axes[angle] = figure.add_subplot(grid[row, column])
@@ -200,12 +203,17 @@ def _curves(motion: Motion, left: list[int]) -> dict[str, Array]:
     return curves
 
 
-def _phases(axes: dict[str, Axes], library: GaitLibrary) -> None:
+def _phases(axes: dict[str, Axes], library: GaitLibrary, robot: Robot) -> None:
     """Shade the phases with feet on the ground, the panel's own or any, of the middle gait."""
     gait = library.gaits[len(library.gaits) // 2]
+    of_leg = {
+        robot.legs[leg]: pair
+        for pair, legs in zip(_PAIRS, mirror(robot).pairs, strict=False)
+        for leg in legs
+    }
     for key, panel in axes.items():
         for phase, start in zip(gait.phases, _starts(gait), strict=True):
-            pairs = {_PAIRS[0] if leg.startswith("F") else _PAIRS[1] for leg in phase.feet}
+            pairs = {of_leg[leg] for leg in phase.feet}
             if pairs and (key.split()[0] in pairs or key.split()[0] not in _PAIRS):
                 end = (start + phase.duration) / gait.duration
                 panel.axvspan(start / gait.duration, end, color="0.93", lw=0, zorder=0)
@@ -216,7 +224,7 @@ def _limits(axes: Axes, key: str, robot: Robot) -> None:
     words = key.split()
     if words[-1] not in ("angle", "torque"):
         return
-    leg = 0 if words[0] == _PAIRS[0] else len(robot.legs) // 2
+    leg, _ = mirror(robot).pairs[_PAIRS.index(words[0])]
     column = len(JOINTS) * leg + JOINTS.index(words[1])
     bounds = {
         "angle": (robot.q_min[column], robot.q_max[column]),
@@ -243,6 +251,11 @@ def _at(gait: Gait, robot: Robot, time: float) -> tuple[Motion, str]:
     return phase.motion(robot, s), phase.name
 
 
+def _scale(robot: Robot) -> float:
+    """Length of the forces' arrows beside those of the A1: by the robot's size, and its weight."""
+    return length_scale(robot) * load_robot("a1").mass / robot.mass
+
+
 def _pose(axes: Axes, robot: Robot, motion: Motion, shift: float, color: Array) -> None:
     """Trunk and left legs of one pose, and the forces on its feet."""
     q = motion.q[0]
@@ -250,16 +263,15 @@ def _pose(axes: Axes, robot: Robot, motion: Motion, shift: float, color: Array) 
     hips = []
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, q)
-    for leg, name in enumerate(robot.legs):
-        if not name.endswith("L"):
-            continue
-        joints = [robot.model.getJointId(joint) for joint in robot.spec.leg_joints(name)]
+    for leg, _ in mirror(robot).pairs:
+        names = robot.spec.leg_joints(robot.legs[leg])
+        joints = [robot.model.getJointId(joint) for joint in names]
         points = [np.array(data.oMi[joint].translation) for joint in joints[1:]] + [feet[leg]]
         hips.append(points[0])
         line = np.array(points)
         axes.plot(line[:, 0] + shift, line[:, 2], color=color, lw=2.2, solid_capstyle="round")
         axes.plot(feet[leg, 0] + shift, feet[leg, 2], "o", color=color, ms=3.5)
-        force = _ARROW * motion.lam[0, leg]
+        force = _ARROW * _scale(robot) * motion.lam[0, leg]
         if np.linalg.norm(force) > 1e-3:
             axes.annotate(
                 "",

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..._typing import Array, IntArray
 from ...compare import steady
-from ...compare.metrics import robots, table_1
+from ...compare.metrics import of_first_leg, robots, table_1
 from ...compare.report import SHOWN
 from ..figure_style import (
     ACCENT,
@@ -29,8 +29,6 @@ from ..figure_style import (
 
 LABELS = {name: entry.label for name, entry in LOOKS.items()}
 """Controllers in words."""
-
-_LEG = "FL"  # the leg that the paper shows
 
 
 def stance(strides: xr.Dataset, name: str) -> xr.DataArray:
@@ -66,17 +64,18 @@ def tracking(strides: xr.Dataset, *, speed: float, seconds: tuple[float, float])
     time: Axes | None = None
     for row, joint in enumerate(SHOWN):
         time = figure.add_subplot(grid[row, :2], sharex=time)
-        _over_time(time, of_speed, f"{_LEG}_{joint}", shown, switch)
+        name = of_first_leg(strides, joint)
+        _over_time(time, of_speed, name, shown, switch)
         if learning.size:
             time.axvline(began, color=ACCENT, lw=1.0)
             time.annotate("learning on", (began, 1.02), xycoords=("data", "axes fraction"))
-        time.set_ylabel(f"{joint}, {_LEG} [rad]")
+        time.set_ylabel(f"{name} [rad]")
         first: Axes | None = None
-        for column, (name, stride) in enumerate((("pd", switch - 1), ("ilc", count - 1))):
+        for column, (controller, stride) in enumerate((("pd", switch - 1), ("ilc", count - 1))):
             if stride < 0:
                 continue  # nothing before the learning
             first = figure.add_subplot(grid[row, 2 + column], sharey=first)
-            _one_stance(first, of_speed, f"{_LEG}_{joint}", stride, name)
+            _one_stance(first, of_speed, name, stride, controller)
             if row == 1:
                 first.set_xlabel("stance phase")
     if time is not None:
@@ -116,7 +115,8 @@ def torque_surface(strides: xr.Dataset) -> Figure:
     torque = _learned(strides)
     figure = new_figure(TWO_COLUMNS, 2.6)
     for axes, joint in zip(figure.subplots(1, 2), SHOWN, strict=True):
-        surface = torque.sel(joint=f"{_LEG}_{joint}").transpose("speed", "phase")
+        name = of_first_leg(torque, joint)
+        surface = torque.sel(joint=name).transpose("speed", "phase")
         x, y, z = (a.to_numpy() for a in (strides["phase"], strides["speed"], surface))
         if len(y) < 2:  # one speed is no surface: a stripe
             y, z = y[0] + np.array([-0.05, 0.05]), np.repeat(z, 2, axis=0)
@@ -130,7 +130,7 @@ def torque_surface(strides: xr.Dataset) -> Figure:
             lines = axes.contour(x, y, z, levels=8, colors=color, linewidths=0.5)
             axes.clabel(lines, fontsize=6)
         axes.grid(visible=False)
-        axes.set_title(f"{joint}, {_LEG}")
+        axes.set_title(name)
         axes.set_xlabel("stance phase")
         axes.set_ylabel("speed [m/s]")
         figure.colorbar(filled, ax=axes, label="learned torque [N m]")
@@ -162,10 +162,10 @@ def _by_speed(torque: xr.DataArray, phase: Array, label: str) -> Figure:
     colors = colormaps[SEQUENTIAL](np.linspace(0.0, 0.92, len(speeds)))
     for axes, joint in zip(panels, SHOWN, strict=True):
         for k in range(len(speeds)):
-            curve = torque.isel(speed=k).sel(joint=f"{_LEG}_{joint}")
+            curve = torque.isel(speed=k).sel(joint=of_first_leg(torque, joint))
             axes.plot(phase, curve, color=colors[k], label=f"{speeds[k]:g}")
         axes.axhline(0.0, color="0.6", lw=0.6)
-        axes.set_title(f"{joint}, {_LEG}")
+        axes.set_title(of_first_leg(torque, joint))
         axes.set_xlabel("stance phase")
         axes.set_ylabel(label)
     handles, labels = panels[0].get_legend_handles_labels()

@@ -9,6 +9,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from ..._typing import Array
+from ...robot import Robot
 from ..figure_style import SEQUENTIAL
 from ..scenes import GHOST_COLOR, Scene, Track
 from .packing import pack
@@ -54,7 +55,7 @@ def robot_blob(scene: Scene) -> bytes:
             ],
             "shapes": [vars(shape) for shape in shapes],
             "jointNames": [name.removesuffix("_joint") for name in names],
-            "shown": _shown_joint(names),
+            "shown": _shown_joint(robot),
             "legs": list(robot.legs),
             "footRadius": robot.foot_radius,
             "size": max(1.0, float(robot.standing[2]) / _USUAL_HEIGHT),
@@ -129,6 +130,7 @@ def _matrix(pose: Array) -> list[float]:
     return [float(value) for value in pose.T.ravel()]
 
 
-def _shown_joint(names: list[str]) -> int:
+def _shown_joint(robot: Robot) -> int:
     """The joint that the plots begin with: the last of the first leg, the calf."""
-    return next((i for i, name in enumerate(names) if "calf" in name.lower()), 0)
+    last = robot.spec.leg_joints(robot.legs[0])[-1]
+    return int(robot.joint_names.index(last))

@@ -254,8 +254,8 @@ class _Samples:
         ticks = kept.transpose("last", "part", "tick", "foot", ...).to_numpy()
         ticks = ticks[np.isfinite(ticks).all(axis=(-2, -1))]  # (ticks, 4, 3), one after the other
         timestep = float(strides.attrs["timestep"])
-        impulse = np.concatenate([np.zeros((1, 12)), np.cumsum(ticks.reshape(-1, 12), axis=0)])
-        impulse *= timestep
+        impulse = np.concatenate([np.zeros_like(ticks[:1]), np.cumsum(ticks, axis=0)])
+        impulse = timestep * impulse.reshape(len(impulse), -1)
         begin = float(self.begin[shown[0], 0, 0])
         clock = begin + timestep * np.arange(len(impulse))
         times = self.times
@@ -266,7 +266,7 @@ class _Samples:
         ]
         span = np.maximum(times - before, timestep)
         forces = np.where(times < begin, np.nan, np.array(impulses) / span).T
-        return np.asarray(forces.reshape(len(times), 4, 3))
+        return np.asarray(forces.reshape(len(times), *ticks.shape[1:]))
 
 
 def _measured(robot: Robot, strides: xr.Dataset, name: str) -> Track:

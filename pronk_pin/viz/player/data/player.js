@@ -299,7 +299,7 @@ class Plot {
     pen.font = "11px system-ui, sans-serif"; pen.fillStyle = "#555"; pen.strokeStyle = "#ddd";
     pen.textAlign = "right"; pen.textBaseline = "middle";
     for (let v = low; v < high + step / 2; v += step) {
-      pen.fillText(String(Number(v.toPrecision(3))), 36, y(v));
+      pen.fillText(String(Number((step * Math.round(v / step)).toPrecision(3))), 36, y(v));
       line(pen, [[40, y(v)], [width - 6, y(v)]]);
     }
     pen.textAlign = "center";
