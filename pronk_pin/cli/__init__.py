@@ -53,7 +53,10 @@ def _commands(arguments: list[str]) -> Any:
     following = dict(pairwise(words))
     suite = following.get("--suite", "default")
     known_name("suite", suite, SUITES)
-    experiment = load_suite(suite)
+    # Speeds and controllers begin with those of the robot and its gaits.
+    options = ("robot", "gaits", "base") if words[:1] == ["compare"] else ()
+    given = {name: following[f"--{name}"] for name in options if f"--{name}" in following}
+    experiment = load_suite(suite, **given)
     folder = Path(following.get("--folder", ""))
     if (
         words[:1] == ["compare"]

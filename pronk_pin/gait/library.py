@@ -459,7 +459,8 @@ def load_library(
         raise FileProblem(
             f"{name}.npz",
             "no such gait library is shipped",
-            f"build one with 'pronk-pin gaits build{options}', and look at it with --library",
+            f"build one with 'pronk-pin gaits build{options}', and give its file to compare with "
+            "--gaits, or to gaits with --library",
         )
     return _shipped(name)
 

@@ -11,6 +11,7 @@ import pytest
 
 from pronk_pin import cli, load_robot
 from pronk_pin.cli import main
+from pronk_pin.gait import SPEEDS
 from pronk_pin.robot import ROBOTS
 from pronk_pin.robot.formats.urdf import mujoco_spec
 
@@ -317,3 +318,15 @@ def test_values_that_look_like_an_old_option_stay_as_they_are(
     monkeypatch.setitem(cli.RENAMED, "--tempo", "--speed")
     arguments = ["view", "tempo", "--figure=--tempo", "--tempos", "1"]
     assert cli.todays_options(arguments) == arguments
+
+
+def test_a_comparison_begins_with_the_speeds_and_the_controllers_of_its_robot() -> None:
+    command = cli._parsed(["compare", "--robot", "bolt"])
+    assert command.experiment.speeds == (-0.2, 0.0, 0.2, 0.4, 0.6)
+    assert command.experiment.controller_names == (
+        *("pd", "ilc-paper", "ilc-stance", "ilc", "model", "library"),
+    )
+    command = cli._parsed(["compare", "--robot=bolt", "--speeds", "0.3", "--controllers", "pd"])
+    assert command.experiment.speeds == (0.3,)
+    assert command.experiment.controller_names == ("pd",)
+    assert cli._parsed(["compare"]).experiment.speeds == SPEEDS

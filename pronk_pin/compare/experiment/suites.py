@@ -56,10 +56,14 @@ list of mismatches; the paper's speeds in every scenario of that list; learning 
 learns with gain 0, on rough ground, where seeds differ; Table I, with the paper's own law."""
 
 
-def load_suite(name: str) -> Experiment:
+def load_suite(name: str, **changes: Any) -> Experiment:
     """The experiment of that name.
+
+    Args:
+        name: One of `SUITES`.
+        changes: Fields of the experiment that are otherwise.
 
     Raises:
         UnknownName: There is none.
     """
-    return Experiment(**SUITES[known_name("suite", name, SUITES)])
+    return Experiment(**{**SUITES[known_name("suite", name, SUITES)], **changes})
