@@ -71,9 +71,11 @@ class ModelParameters:
             joints: How many kinds a leg has.
 
         Raises:
-            InvalidInput: The parameter has not one value for each kind.
+            InvalidInput: The parameter has not one value for each kind, and is not zero.
         """
         values = getattr(self, name)
+        if not any(values):  # the default, which fits any leg
+            return np.zeros(len(kinds))
         if len(values) != joints:
             raise InvalidInput(
                 f"{name} has {len(values)} values; give {joints}, one for each joint of a leg"

@@ -64,7 +64,7 @@ class Robot(Displayed):
         spec: The names the robot was built from.
         urdf_path: The URDF it was read from.
         urdf: What was in it then.
-        package_dir: Folder against which the URDF's `package://` meshes are resolved.
+        package_dir: Folder in which packages lie that the URDF's meshes may be of, see `find_mesh`.
         model: Pinocchio's model with a floating base; treat it as read-only.
         foot_radius: Radius of the spherical feet [m].
         urdf_joint_names: The joints in the order of the URDF document, which is MuJoCo's order.

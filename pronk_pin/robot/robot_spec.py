@@ -6,6 +6,7 @@ import importlib.metadata
 import xml.etree.ElementTree as ElementTree
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -40,10 +41,17 @@ _DATA_DISTRIBUTION = "example-robot-data"
 
 def _own_file(urdf: str) -> str:
     """The absolute path of a file that is there, whatever the current folder is later on."""
-    with suppress(OSError, ValueError, RuntimeError):  # a name that no file can have
+    with suppress(RuntimeError):  # there is no home
         path = Path(urdf).expanduser()
-        return str(path.resolve()) if not path.is_absolute() and path.is_file() else urdf
+        return str(path.resolve()) if not path.is_absolute() and _is_file(path) else urdf
     return urdf
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
 
 
 @dataclass(frozen=True)
@@ -278,24 +286,31 @@ def place_feet(spec: RobotSpec, document: ElementTree.Element, model: pin.Model)
 
 
 def locate(urdf: str) -> tuple[Path, Path]:
-    """Path of a URDF and of the folder that its `package://` addresses start from.
+    """Path of a URDF, and of a folder with packages that its `package://` addresses may name.
 
     Raises:
         FileProblem: There is no such URDF.
     """
-    path = Path(urdf).expanduser()
+    path, data = Path(urdf).expanduser(), _data_folder()
     if path.is_absolute():
         check_file(path, "check the path in the RobotSpec")
-        return path, path.parent
-    wanted = f"example-robot-data/robots/{urdf}"
+        return path, data or path.parent
+    wanted = Path("example-robot-data", "robots", urdf)
+    if data is None or not _is_file(data / wanted):
+        remedy = f"check the path, or run 'pip install {_DATA_DISTRIBUTION}'"
+        raise FileProblem(path, f"neither a file nor a robot of {_DATA_DISTRIBUTION}", remedy)
+    return data / wanted, data
+
+
+@lru_cache(maxsize=1)
+def _data_folder() -> Path | None:
+    """The folder in which example-robot-data lies, if it is installed."""
     try:
         files = importlib.metadata.files(_DATA_DISTRIBUTION) or []
     except importlib.metadata.PackageNotFoundError:
-        files = []
+        return None
     for file in files:
-        if file.as_posix().endswith(wanted):
-            located = Path(str(file.locate())).resolve()
-            return located, located.parents[len(Path(wanted).parts) - 1]
-    raise FileProblem(
-        wanted, "not found in the installed packages", f"run 'pip install {_DATA_DISTRIBUTION}'"
-    )
+        if "example-robot-data/robots/" in file.as_posix():
+            parents = Path(str(file.locate())).resolve().parents
+            return next(each.parent for each in parents if each.name == "example-robot-data")
+    return None

@@ -53,8 +53,8 @@ def document_of(data: bytes) -> ElementTree.Element:
 def find_mesh(address: str, urdf: Path, package_dir: Path) -> Path:
     """The file that the address of a mesh means.
 
-    That of a package is sought in a folder of its name above the URDF, in `package_dir`, and where
-    `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` say.
+    That of a package is sought in a folder of its name above the URDF, or beside one of these, in
+    `package_dir`, and where `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH` say.
 
     Args:
         address: The address, as it stands in the URDF.
@@ -75,12 +75,12 @@ def find_mesh(address: str, urdf: Path, package_dir: Path) -> Path:
             for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
         )
         packages = [folder for folder in (*urdf.parents, *ros) if folder.name == package]
-        packages += [package_dir / package, *(folder / package for folder in ros)]
+        packages += [folder / package for folder in (*urdf.parents, package_dir, *ros)]
         packages += [folder / "share" / package for folder in ament]
         places = [folder / rest for folder in packages]
         remedy = (
-            f"put it into a folder named {package} above the URDF, or that folder's place into "
-            "ROS_PACKAGE_PATH"
+            f"put it into a folder named {package} above the URDF or beside one of these, or that "
+            "folder's place into ROS_PACKAGE_PATH"
         )
     for place in places:
         with contextlib.suppress(OSError, ValueError):  # a name that no file can have

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin import ModelParameters, Robot
+from pronk_pin import ModelParameters, Robot, RobotSpec, load_robot
 from pronk_pin._typing import Array
 from pronk_pin.dynamics import (
     contact_jacobian,
@@ -261,3 +261,20 @@ def test_parameters_must_fit_the_robot(robot: Robot) -> None:
         robot.with_parameters(ModelParameters(armature=(0.1, 0.1)))
     with pytest.raises(InvalidInput, match="leaves nothing of the trunk"):
         robot.with_parameters(ModelParameters(payload=-20.0))
+
+
+def test_no_friction_fits_legs_of_any_number_of_joints() -> None:
+    spec = RobotSpec(
+        "solo",
+        "solo_description/robots/solo.urdf",
+        base_link="base_link",
+        legs=("FL", "FR", "HL", "HR"),
+        joints=("HFE", "KFE"),
+        joint_pattern="{leg}_{joint}",
+        foot_pattern="{leg}_FOOT",
+        standing=(0.8, -1.6),
+        foot_radius=0.016,
+    )
+    solo = load_robot(spec).with_parameters(ModelParameters(payload=1.0))
+    np.testing.assert_array_equal(solo.of_joint("damping"), np.zeros(8))
+    assert solo.mass == pytest.approx(load_robot(spec).mass + 1.0)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from pronk_pin.compare import build_model, load_scenario
+from pronk_pin.compare import build_model, load_scenario, mjcf_parity
 from pronk_pin.errors import FileProblem, InvalidInput
 from pronk_pin.kinematics import foot_positions
-from pronk_pin.parity import compare_models
+from pronk_pin.parity import SIX_DIGITS, compare_models
 from pronk_pin.robot import ROBOTS, Robot, RobotSpec, load_robot
-from pronk_pin.robot.formats import body_inertia, mujoco_spec
+from pronk_pin.robot.formats import body_inertia, mujoco_spec, write_mjcf, write_urdf
 
 THREE = ("HAA", "HFE", "KFE")
 
@@ -261,6 +262,18 @@ def test_it_stands_on_its_feet(spec: RobotSpec) -> None:
     heights = [data.geom(foot).xpos[2] - model.geom(foot).size[0] for foot in robot.foot_names]
     np.testing.assert_allclose(heights, 0.0, atol=1e-9)
     np.testing.assert_allclose(foot_positions(robot, robot.standing)[:, 2], robot.foot_radius)
+
+
+@pytest.mark.parametrize("spec", SIMULATED, ids=lambda spec: spec.name)
+def test_what_is_written_is_the_same_robot(spec: RobotSpec, tmp_path: Path) -> None:
+    robot = load_robot(spec)
+    parity = mjcf_parity(robot, write_mjcf(robot, tmp_path / "robot.xml"))
+    assert parity.mass_matrix is not None
+    assert parity.mass_matrix < SIX_DIGITS
+    urdf = write_urdf(robot, tmp_path / "robot.urdf")
+    own = load_robot(replace(spec, urdf=str(urdf)))
+    assert own.model.inertias.tolist() == robot.model.inertias.tolist()
+    np.testing.assert_array_equal(own.standing, robot.standing)
 
 
 @pytest.mark.parametrize("name", REFUSED)

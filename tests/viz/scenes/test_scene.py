@@ -270,6 +270,7 @@ def test_meshes_of_packages_are_found(
     urdf = tmp_path / "my_robot" / "urdf" / "own.urdf"
     places = {
         "package://my_robot/meshes/a.stl": tmp_path / "my_robot" / "meshes" / "a.stl",
+        "package://beside/a.stl": tmp_path / "beside" / "a.stl",
         "package://other/b.stl": tmp_path / "ros" / "other" / "b.stl",
         "package://third/c.stl": tmp_path / "ament" / "share" / "third" / "c.stl",
         "d.stl": urdf.parent / "d.stl",
@@ -282,8 +283,16 @@ def test_meshes_of_packages_are_found(
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "ament"))
     for address, path in places.items():
         assert find_mesh(address, urdf, urdf.parent) == path
-    with pytest.raises(FileProblem, match=r"folder named lost above the URDF, .*ROS_PACKAGE_PATH"):
+    with pytest.raises(FileProblem, match=r"folder named lost above the URDF.*ROS_PACKAGE_PATH"):
         find_mesh("package://lost/f.stl", urdf, urdf.parent)
+
+
+def test_a_copy_of_a_urdf_of_example_robot_data_keeps_its_meshes(
+    robot: Robot, tmp_path: Path
+) -> None:
+    (tmp_path / "own.urdf").write_bytes(robot.urdf)
+    own = appearance(load_robot(RobotSpec("own", str(tmp_path / "own.urdf"))))
+    assert len(own.parts) == len(appearance(robot).parts)
 
 
 _TORN = [
