@@ -29,6 +29,7 @@ from .._checks import reals, worker_count
 from .._typing import Array
 from .._workers import begin_worker, leave_main_to_parent, unguarded_script
 from ..errors import FileProblem, GaitNotFound, InvalidInput, NoMainGuard, WorkerLost
+from ..kinematics import mirror
 from ..robot import Base, Robot, RobotSpec, as_robot, load_robot
 from ..storage import clear_partial_files, read_arrays, temporary_folder, write_arrays
 from .audit import audit, bezier_orders
@@ -97,7 +98,8 @@ def build_library(
     leave_main_to_parent()
     began = time.perf_counter()
     style = load_style(gait)
-    apex = style.apex_of(as_robot(robot))
+    mirror(as_robot(robot))  # before all else: legs that gaits can be made for
+    apex = style.apex_of(robot)
     speeds = reals("speeds", style.speeds if speeds is None else speeds)
     apexes = reals("apex", (apex,) if apexes is None else apexes)
     if not speeds or not apexes:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .._checks import Interval, known_name, real, sequence_of, shown, text
 from ..errors import InvalidInput
+from ..kinematics import mirror
 from ..robot import (
     Base,
     Robot,
@@ -91,11 +92,13 @@ def gait_problem(
 
     Raises:
         UnknownName: There is no such gait or base.
-        InvalidInput: The problem makes no sense.
+        InvalidInput: The problem makes no sense, or the robot's legs are not of three joints, in
+            pairs.
     """
     style = load_style(gait)
     base = style.base if base is None else known_base(base)
-    apex = style.apex_of(as_robot(robot))
+    mirror(as_robot(robot))  # it has legs that gaits can be made for
+    apex = style.apex_of(robot)
     sequence = style.pitching if base == "sagittal" else style.sequence
     defaults: dict[str, Any] = {
         "apex": apex,

@@ -9,7 +9,7 @@ import pytest
 
 from pronk_pin import Robot, RobotSpec, load_robot
 from pronk_pin.errors import InvalidInput
-from pronk_pin.gait import gait_problem
+from pronk_pin.gait import build_library, gait_problem
 from pronk_pin.kinematics import foot_positions, mirror, mirrored
 from pronk_pin.robot import ROBOTS
 
@@ -60,3 +60,45 @@ def test_a_biped_has_no_rear_legs_for_a_bound() -> None:
     assert [phase.stands for phase in gait_problem(biped, 0.0).sequence] == [("front",), ()]
     with pytest.raises(InvalidInput, match=r"bolt has no rear legs, which rear stance needs"):
         gait_problem(biped, 0.0, gait="bound")
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        (
+            RobotSpec(
+                "solo8",
+                "solo_description/robots/solo.urdf",
+                base_link="base_link",
+                legs=("FL", "FR", "HL", "HR"),
+                joints=("HFE", "KFE"),
+                joint_pattern="{leg}_{joint}",
+                foot_pattern="{leg}_FOOT",
+                standing=(0.9, -1.8),
+                foot_radius=0.016,
+            ),
+            "solo8: closed-form leg kinematics needs legs of three joints and no others, not FL",
+        ),
+        (
+            RobotSpec(
+                "arm",
+                "anymal_b_simple_description/robots/anymal-kinova.urdf",
+                base_link="base",
+                legs=("LF", "LH", "RF", "RH"),
+                joints=("HAA", "HFE", "KFE"),
+                joint_pattern="{leg}_{joint}",
+                foot_pattern="{leg}_FOOT",
+                standing=(0.0, 0.9, -1.8, 0.0, -0.9, 1.8) * 2,
+            ),
+            "arm: closed-form leg kinematics needs legs of three joints and no others, not LF_HAA",
+        ),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_robots_that_no_gait_can_be_made_for_hear_why_before_the_solver_is_called(
+    spec: RobotSpec, message: str
+) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        gait_problem(load_robot(spec), 0.0)
+    with pytest.raises(InvalidInput, match=message):
+        build_library(load_robot(spec), (0.0,))
