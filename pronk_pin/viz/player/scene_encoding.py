@@ -9,6 +9,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from ..._typing import Array
+from ...kinematics import foot_positions
 from ...robot import Robot
 from ..figure_style import SEQUENTIAL
 from ..scenes import GHOST_COLOR, Scene, Track
@@ -21,6 +22,9 @@ _ERROR_STEPS = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 _USE_STEPS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 # Ends of the colour scales [rad], [of the limit].
 
+
+_USUAL_LENGTH = 0.45
+"""Distance of front and rear feet of a robot that the camera is set for [m]."""
 
 _USUAL_HEIGHT = 0.36
 """Height of a standing trunk up to which the camera need not step back [m]."""
@@ -58,7 +62,7 @@ def robot_blob(scene: Scene) -> bytes:
             "shown": _shown_joint(robot),
             "legs": list(robot.legs),
             "footRadius": robot.foot_radius,
-            "size": max(1.0, float(robot.standing[2]) / _USUAL_HEIGHT),
+            "size": _size(robot),
             "torqueLimits": robot.tau_max.tolist(),
             "scale": [to_hex(c) for c in colormaps[SEQUENTIAL](np.linspace(0.0, 1.0, 32))],
         }
@@ -128,6 +132,12 @@ def _end(
 def _matrix(pose: Array) -> list[float]:
     """A pose by columns, as three.js takes it."""
     return [float(value) for value in pose.T.ravel()]
+
+
+def _size(robot: Robot) -> float:
+    """How much farther the camera stands than from the A1: for tall robots, and for long ones."""
+    length = float(np.ptp(foot_positions(robot, robot.standing)[:, 0]))
+    return max(1.0, float(robot.standing[2]) / _USUAL_HEIGHT, length / _USUAL_LENGTH)
 
 
 def _shown_joint(robot: Robot) -> int:
