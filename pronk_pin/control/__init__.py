@@ -5,7 +5,7 @@ Goes out: a `Tape` for each phase, and torque at each tick where the base is fre
 """
 
 from ..robot import BASES
-from .controller import Controller
+from .controller import Controller, GaitChange
 from .controller_spec import CONTROLLERS, ControllerSpec, load_controller
 from .feedback import (
     AttitudeEstimator,
@@ -49,6 +49,7 @@ from .signals import (
     ImpactDetector,
     PhaseLog,
     Reference,
+    SpeedProfile,
     StanceContact,
     StrideRecord,
     Tape,
@@ -58,6 +59,7 @@ from .signals import (
     phase_grid,
     resample,
 )
+from .speed_command import REFERENCES, SpeedCommand
 from .tick_control import (
     BindableTickController,
     ComputedTorque,
@@ -74,6 +76,7 @@ __all__ = [
     "BASES",
     "CONTROLLERS",
     "PARTS",
+    "REFERENCES",
     "SAMPLES",
     "SKIPPED",
     "AttitudeEstimator",
@@ -93,6 +96,7 @@ __all__ = [
     "FlightTiming",
     "FootPlacement",
     "Gains",
+    "GaitChange",
     "ImpactDetector",
     "InitialFeedforward",
     "LawContext",
@@ -110,6 +114,8 @@ __all__ = [
     "PlantInversionILC",
     "Reference",
     "SetPoints",
+    "SpeedCommand",
+    "SpeedProfile",
     "StanceContact",
     "StrideRecord",
     "StrideSelection",

@@ -6,8 +6,9 @@ the tapes; the controller is called at each touchdown, lift-off and landing of a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,11 +75,31 @@ def _known_feedforward(feedforward: Array | None, n: int, joints: int) -> Array:
     return feedforward.copy()
 
 
+class GaitChange(NamedTuple):
+    """Other gaits for m robots, and what changes with them; see `Controller.liftoff`."""
+
+    gaits: Sequence[Gait]
+    """The gait of each from now on."""
+    feedforward: Array
+    """What comes on top of its feedforward [N m], shape (m, 2, samples, 12)."""
+    flight: Array
+    """Factor of its flights' duration beside the planned one, over what it was, shape (m,)."""
+    lift_off_speed: Array
+    """Speed that the regulation wants at lift-off [m/s], shape (m,)."""
+
+
+def lift_off_speed(gait: Gait) -> float:
+    """Speed of the trunk with which a gait leaves the ground [m/s]."""
+    return float(gait.stance.base_reference(np.array([1.0]))[1][0, 0])
+
+
 class Controller:
     """The controller of one `ControllerSpec` for n robots, each with its own gait.
 
     A stride is `touchdown`, then `liftoff` with what was measured in stance, then `landing` with
     what was measured in flight.
+
+    Gaits that robots may change to are the `others`.
 
     Attributes:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
@@ -102,6 +123,7 @@ class Controller:
         feedforward: Array | None = None,
         flight: Array | None = None,
         base: str = "locked",
+        others: Sequence[Gait] = (),
     ) -> None:
         gaits = known_gaits(robot, gaits)
         instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
@@ -120,8 +142,15 @@ class Controller:
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
-        self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
-        self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
+        self._stance = Reference.of(
+            [gait.stance for gait in gaits], timestep, 1.0, others=[gait.stance for gait in others]
+        )
+        self._flight = Reference.of(
+            [gait.flight for gait in gaits],
+            timestep,
+            LATEST_TOUCHDOWN,
+            others=[gait.flight for gait in others],
+        )
         self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
         if flight is not None:
             self._flight.stretch(np.arange(n), as_array("flight", flight, n, ()))
@@ -138,10 +167,8 @@ class Controller:
             self.guard = GuardState(spec.guard, Memory(self.feedforward, self._flight.duration))
         self._always_retimes = flight is None and not any(self._laws)
         self._thigh = leg_geometry(robot).sense[:, 1]  # sense in which the thighs turn legs back
-        end = np.array([1.0])
-        self._lift_off_speed = np.array(
-            [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
-        )
+        self._lift_off_speed = np.array([lift_off_speed(gait) for gait in gaits])
+        self._pending: dict[int, tuple[Gait, Array]] = {}  # gaits that are flown to
 
     def _context(self) -> LawContext:
         """What balance and the law of the stance are bound to."""
@@ -174,7 +201,7 @@ class Controller:
     @property
     def max_ticks(self) -> int:
         """Length of the longest tape [ticks]."""
-        return int(max(self._stance.ticks.max(), self._flight.ticks.max()))
+        return int(max(self._stance.phase.shape[1], self._flight.phase.shape[1]))
 
     def stand(self, ticks: int = 1) -> Tape:
         """Tapes of the start-up: every robot holds the posture in which its stance begins."""
@@ -186,7 +213,11 @@ class Controller:
         return Tape(zero, position, zero, length, acceleration=zero, phase=phase)
 
     def touchdown(
-        self, rows: IntArray, learning: BoolArray | None = None, *, late: int | None = None
+        self,
+        rows: IntArray,
+        learning: BoolArray | None = None,
+        *,
+        late: int | None = None,
     ) -> Tape:
         """Learn from the last stride of robots that touched down, and write their stance tapes.
 
@@ -203,6 +234,7 @@ class Controller:
             learns[learning] &= ~self._roll_back(rows[learning], usable[learning])
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
+        self._change_stances(rows)
         reference, position = self._stance, self._stance.position[rows]
         acceleration, phase = self._of_the_tick(reference, rows, slice(None))
         return Tape(
@@ -215,6 +247,52 @@ class Controller:
             phase=phase,
         )
 
+    def _change_flights(self, rows: IntArray, change: GaitChange) -> None:
+        """Fly to other gaits' touchdowns, with what was learned moved to them."""
+        if self.balance is not None or self.guard is not None:
+            raise InvalidInput(
+                f"controller '{self.spec.name}' cannot change its gait: what balances a trunk that "
+                "may turn, and the guard of the learning, are of one gait; use base 'locked', and "
+                "a controller with guard=None"
+            )
+        self._flight.change(rows, [gait.flight for gait in change.gaits], LATEST_TOUCHDOWN)
+        self._flight.stretch(rows, self._flight.duration[rows] * change.flight)
+        self._lift_off_speed[rows] = change.lift_off_speed
+        added = np.broadcast_to(change.feedforward, (len(rows), *self.feedforward.shape[1:]))
+        self.feedforward[rows, 1] += added[:, 1]
+        self._pending.update(
+            (int(row), (gait, stance))
+            for row, gait, stance in zip(rows, change.gaits, added[:, 0], strict=True)
+        )
+
+    def _change_stances(self, rows: IntArray) -> None:
+        """Stand in the gaits that were flown to."""
+        changed = [int(row) for row in rows if int(row) in self._pending]
+        if not changed:
+            return
+        gaits = list(self.gaits)
+        for row in changed:
+            gaits[row], added = self._pending.pop(row)
+            self.feedforward[row, 0] += added
+        self.gaits = tuple(gaits)
+        self._stance.change(np.array(changed), [gaits[row].stance for row in changed], 1.0)
+
+    def _joined(
+        self, rows: IntArray, ended: Array, position: Array, velocity: Array
+    ) -> tuple[Array, Array]:
+        """Flights that begin where the stances ended (m, 12), and are their own when legs turned.
+
+        What lies between goes with `1 - profile` of the regulation.
+        """
+        reference = self._flight
+        phase = reference.phase[rows, : position.shape[1]]
+        share, rate = self.spec.regulator.profile(phase)
+        between = (ended - reference.position[rows, 0])[:, None]
+        return (
+            position + (1.0 - share)[..., None] * between,
+            velocity - (rate / reference.duration[rows, None])[..., None] * between,
+        )
+
     def _of_the_tick(
         self, reference: Reference, rows: IntArray, ticks: slice
     ) -> tuple[Array | None, Array | None]:
@@ -223,8 +301,20 @@ class Controller:
             return None, None
         return reference.acceleration(rows, ticks), reference.phase[rows, ticks]
 
-    def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
-        """Write the flight tapes of robots that have just finished a stance, and its record."""
+    def liftoff(
+        self,
+        rows: IntArray,
+        log: PhaseLog,
+        next_gaits: Callable[[Array], GaitChange] | None = None,
+    ) -> tuple[Tape, StrideRecord]:
+        """Write the flight tapes of robots that have just finished a stance, and its record.
+
+        Args:
+            rows: Which robots.
+            log: What was measured in stance.
+            next_gaits: Gives the gaits that they land in, by their speeds (m,) [m/s]; by default
+                they keep theirs. Flights go over to them from where the stances ended.
+        """
         record = self.record(0, rows, log)
         self._last[0].put(rows, self._learnable(record, rows, log))
         self._stance_verdict[rows] = self._judge_contact(log)
@@ -232,6 +322,9 @@ class Controller:
         speed = self._estimator.update(rows, log)
         if self.balance is not None:
             self.balance.lift_off(rows, self._estimator.sideways[rows])
+        ended = self._stance.position[rows, self._stance.ticks[rows] - 1]
+        if next_gaits is not None:
+            self._change_flights(rows, next_gaits(speed))
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         reference = self._flight
         ticks = slice(int(_LATE_TOUCHDOWN * reference.ends(rows).max()))
@@ -240,6 +333,8 @@ class Controller:
         position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
         velocity = reference.velocity[rows, ticks]
         velocity[..., 1::3] += self._thigh * rate[..., None]
+        if next_gaits is not None:
+            position, velocity = self._joined(rows, ended, position, velocity)
         acceleration, phase = self._of_the_tick(reference, rows, ticks)
         if acceleration is not None and phase is not None:
             curvature = self.spec.regulator.profile_curvature(phase)
