@@ -5,7 +5,7 @@ Goes out: a `Tape` for each phase, and torque at each tick where the base is fre
 """
 
 from ..robot import BASES
-from .controller import Controller, GaitChange
+from .controller import Controller
 from .controller_spec import CONTROLLERS, ControllerSpec, load_controller
 from .feedback import (
     AttitudeEstimator,
@@ -59,7 +59,7 @@ from .signals import (
     phase_grid,
     resample,
 )
-from .speed_command import REFERENCES, SpeedCommand
+from .speed_command import REFERENCES, SpeedCommand, SpeedMemory
 from .tick_control import (
     BindableTickController,
     ComputedTorque,
@@ -96,7 +96,6 @@ __all__ = [
     "FlightTiming",
     "FootPlacement",
     "Gains",
-    "GaitChange",
     "ImpactDetector",
     "InitialFeedforward",
     "LawContext",
@@ -115,6 +114,7 @@ __all__ = [
     "Reference",
     "SetPoints",
     "SpeedCommand",
+    "SpeedMemory",
     "SpeedProfile",
     "StanceContact",
     "StrideRecord",

@@ -6,9 +6,8 @@ the tapes; the controller is called at each touchdown, lift-off and landing of a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -45,6 +44,7 @@ from .signals import (
     phase_grid,
     resample,
 )
+from .speed_command import SpeedCommand, lift_off_speed
 from .tick_control import ControlTime, TickLoop
 
 LATEST_TOUCHDOWN = 2.0
@@ -75,31 +75,13 @@ def _known_feedforward(feedforward: Array | None, n: int, joints: int) -> Array:
     return feedforward.copy()
 
 
-class GaitChange(NamedTuple):
-    """Other gaits for m robots, and what changes with them; see `Controller.liftoff`."""
-
-    gaits: Sequence[Gait]
-    """The gait of each from now on."""
-    feedforward: Array
-    """What comes on top of its feedforward [N m], shape (m, 2, samples, 12)."""
-    flight: Array
-    """Factor of its flights' duration beside the planned one, over what it was, shape (m,)."""
-    lift_off_speed: Array
-    """Speed that the regulation wants at lift-off [m/s], shape (m,)."""
-
-
-def lift_off_speed(gait: Gait) -> float:
-    """Speed of the trunk with which a gait leaves the ground [m/s]."""
-    return float(gait.stance.base_reference(np.array([1.0]))[1][0, 0])
-
-
 class Controller:
     """The controller of one `ControllerSpec` for n robots, each with its own gait.
 
     A stride is `touchdown`, then `liftoff` with what was measured in stance, then `landing` with
     what was measured in flight.
 
-    Gaits that robots may change to are the `others`.
+    With a `command` the gaits change at each stride, and what is learned is stored by speed.
 
     Attributes:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
@@ -123,7 +105,7 @@ class Controller:
         feedforward: Array | None = None,
         flight: Array | None = None,
         base: str = "locked",
-        others: Sequence[Gait] = (),
+        command: SpeedCommand | None = None,
     ) -> None:
         gaits = known_gaits(robot, gaits)
         instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
@@ -142,6 +124,7 @@ class Controller:
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
+        others = () if command is None else command.all_gaits
         self._stance = Reference.of(
             [gait.stance for gait in gaits], timestep, 1.0, others=[gait.stance for gait in others]
         )
@@ -168,7 +151,9 @@ class Controller:
         self._always_retimes = flight is None and not any(self._laws)
         self._thigh = leg_geometry(robot).sense[:, 1]  # sense in which the thighs turn legs back
         self._lift_off_speed = np.array([lift_off_speed(gait) for gait in gaits])
-        self._pending: dict[int, tuple[Gait, Array]] = {}  # gaits that are flown to
+        self._command = self._followed(command)
+        self._landing_gaits = list(self.gaits)  # those that are flown to
+        self._standing_speed = np.array([gait.speed for gait in gaits])
 
     def _context(self) -> LawContext:
         """What balance and the law of the stance are bound to."""
@@ -228,13 +213,14 @@ class Controller:
             late: Ticks ago that they touched down; by default those of the specification.
         """
         usable = self.skipped[rows] == 0
+        before = Memory(self.feedforward[rows], self._flight.duration[rows])
         learns = np.zeros(len(rows), dtype=bool)
         if learning is not None:
             learns = usable & learning
             learns[learning] &= ~self._roll_back(rows[learning], usable[learning])
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
-        self._change_stances(rows)
+        self._change_stances(rows, before)
         reference, position = self._stance, self._stance.position[rows]
         acceleration, phase = self._of_the_tick(reference, rows, slice(None))
         return Tape(
@@ -247,47 +233,61 @@ class Controller:
             phase=phase,
         )
 
-    def _change_flights(self, rows: IntArray, change: GaitChange) -> None:
-        """Fly to other gaits' touchdowns, with what was learned moved to them."""
-        if self.balance is not None or self.guard is not None:
+    def _followed(self, command: SpeedCommand | None) -> SpeedCommand | None:
+        """A command that this controller can follow.
+
+        Raises:
+            InvalidInput: It cannot.
+        """
+        if command is not None and (self.balance is not None or self.guard is not None):
             raise InvalidInput(
                 f"controller '{self.spec.name}' cannot change its gait: what balances a trunk that "
                 "may turn, and the guard of the learning, are of one gait; use base 'locked', and "
                 "a controller with guard=None"
             )
-        self._flight.change(rows, [gait.flight for gait in change.gaits], LATEST_TOUCHDOWN)
-        self._flight.stretch(rows, self._flight.duration[rows] * change.flight)
-        self._lift_off_speed[rows] = change.lift_off_speed
-        added = np.broadcast_to(change.feedforward, (len(rows), *self.feedforward.shape[1:]))
-        self.feedforward[rows, 1] += added[:, 1]
-        self._pending.update(
-            (int(row), (gait, stance))
-            for row, gait, stance in zip(rows, change.gaits, added[:, 0], strict=True)
-        )
+        return command
 
-    def _change_stances(self, rows: IntArray) -> None:
-        """Stand in the gaits that were flown to."""
-        changed = [int(row) for row in rows if int(row) in self._pending]
-        if not changed:
+    def _change_flights(
+        self, command: SpeedCommand, rows: IntArray, commanded: Array, measured: Array
+    ) -> None:
+        """Fly to the touchdowns of other gaits."""
+        change = command.change(rows, commanded, measured)
+        self._flight.change(rows, [gait.flight for gait in change.gaits], LATEST_TOUCHDOWN)
+        stretch = command.memory.stretch_at(rows, change.speed)
+        self._flight.stretch(rows, stretch * self._flight.planned[rows])
+        self._lift_off_speed[rows] = change.lift_off_speed
+        self.feedforward[rows, 1] = command.memory.at(rows, change.speed, 1)
+        for row, gait in zip(rows, change.gaits, strict=True):
+            self._landing_gaits[row] = gait
+
+    def _change_stances(self, rows: IntArray, before: Memory) -> None:
+        """Stand in the gaits that were flown to, after what came on top of the torques and timings
+        `before` was stored."""
+        command = self._command
+        if command is None:
             return
-        gaits = list(self.gaits)
-        for row in changed:
-            gaits[row], added = self._pending.pop(row)
-            self.feedforward[row, 0] += added
-        self.gaits = tuple(gaits)
-        self._stance.change(np.array(changed), [gaits[row].stance for row in changed], 1.0)
+        memory, landed = command.memory, command.speed[rows]
+        learned = self.feedforward[rows] - before.feedforward
+        memory.teach(rows, self._standing_speed[rows], 0, learned[:, 0])
+        memory.teach(rows, landed, 1, learned[:, 1])
+        longer = (self._flight.duration[rows] - before.flight) / self._flight.planned[rows]
+        memory.teach_stretch(rows, landed, longer)
+        self._standing_speed[rows] = landed
+        self.feedforward[rows, 0] = memory.at(rows, landed, 0)
+        self._stance.change(rows, [self._landing_gaits[row].stance for row in rows], 1.0)
+        self.gaits = tuple(self._landing_gaits)
 
     def _joined(
-        self, rows: IntArray, ended: Array, position: Array, velocity: Array
+        self, rows: IntArray, began: Array, position: Array, velocity: Array
     ) -> tuple[Array, Array]:
-        """Flights that begin where the stances ended (m, 12), and are their own when legs turned.
+        """Flights that begin where those of the gaits before do (m, 12), and go over to their own.
 
-        What lies between goes with `1 - profile` of the regulation.
+        What lies between goes as the regulation comes, with `1 - profile`.
         """
         reference = self._flight
         phase = reference.phase[rows, : position.shape[1]]
         share, rate = self.spec.regulator.profile(phase)
-        between = (ended - reference.position[rows, 0])[:, None]
+        between = (began - reference.position[rows, 0])[:, None]
         return (
             position + (1.0 - share)[..., None] * between,
             velocity - (rate / reference.duration[rows, None])[..., None] * between,
@@ -305,15 +305,15 @@ class Controller:
         self,
         rows: IntArray,
         log: PhaseLog,
-        next_gaits: Callable[[Array], GaitChange] | None = None,
+        commanded: Array | None = None,
     ) -> tuple[Tape, StrideRecord]:
         """Write the flight tapes of robots that have just finished a stance, and its record.
 
         Args:
             rows: Which robots.
             log: What was measured in stance.
-            next_gaits: Gives the gaits that they land in, by their speeds (m,) [m/s]; by default
-                they keep theirs. Flights go over to them from where the stances ended.
+            commanded: Speeds that are commanded for their landing (m,) [m/s], where there is a
+                command. Flights go over to the gaits of them from where the stances ended.
         """
         record = self.record(0, rows, log)
         self._last[0].put(rows, self._learnable(record, rows, log))
@@ -322,9 +322,9 @@ class Controller:
         speed = self._estimator.update(rows, log)
         if self.balance is not None:
             self.balance.lift_off(rows, self._estimator.sideways[rows])
-        ended = self._stance.position[rows, self._stance.ticks[rows] - 1]
-        if next_gaits is not None:
-            self._change_flights(rows, next_gaits(speed))
+        began = self._flight.position[rows, 0]  # where the stances end
+        if self._command is not None and commanded is not None:
+            self._change_flights(self._command, rows, commanded, speed)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         reference = self._flight
         ticks = slice(int(_LATE_TOUCHDOWN * reference.ends(rows).max()))
@@ -333,8 +333,8 @@ class Controller:
         position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
         velocity = reference.velocity[rows, ticks]
         velocity[..., 1::3] += self._thigh * rate[..., None]
-        if next_gaits is not None:
-            position, velocity = self._joined(rows, ended, position, velocity)
+        if commanded is not None:
+            position, velocity = self._joined(rows, began, position, velocity)
         acceleration, phase = self._of_the_tick(reference, rows, ticks)
         if acceleration is not None and phase is not None:
             curvature = self.spec.regulator.profile_curvature(phase)

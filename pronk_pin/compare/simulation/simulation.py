@@ -19,7 +19,6 @@ from ...control import (
     Controller,
     ControllerSpec,
     ControlTime,
-    GaitChange,
     InitialFeedforward,
     SpeedCommand,
 )
@@ -101,7 +100,7 @@ class Simulation:
             feedforward=feedforward,
             flight=flight,
             base=base,
-            others=() if command is None else command.all_gaits,
+            command=command,
         )
         self._command = command
         self._threads = threads
@@ -210,7 +209,9 @@ class Simulation:
         stance = player.play(rows, tape, part=0)
         measured_log = player.measured(rows, stance, sensed=late)
         with controller.time.measured():
-            tape, record = controller.liftoff(rows, measured_log, self._next(rows, start + stance))
+            tape, record = controller.liftoff(
+                rows, measured_log, self._commanded(rows, start + stance)
+            )
         if player.sensed is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, sensed=late))
         strides.stance(rows, record, log, stance)
@@ -240,13 +241,12 @@ class Simulation:
         )
         self._clock[rows] = start + stance + flight
 
-    def _next(self, rows: IntArray, clock: IntArray) -> Callable[[Array], GaitChange] | None:
-        """The gaits that robots land in which lift off now: as is commanded when they will."""
-        command = self._command
-        if command is None:
+    def _commanded(self, rows: IntArray, clock: IntArray) -> Array | None:
+        """Speeds that are commanded when robots land that lift off now; None without a command."""
+        if self._command is None:
             return None
-        commanded = command.commanded(rows, self._seconds(clock) + self.controller.flight[rows])
-        return lambda measured: command.change(rows, commanded, measured)
+        landing = self._seconds(clock) + self.controller.flight[rows]
+        return self._command.commanded(rows, landing)
 
     def _seconds(self, ticks: IntArray) -> Array:
         return np.asarray(ticks * self._dt, dtype=float)

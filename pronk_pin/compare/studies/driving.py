@@ -1,4 +1,5 @@
-"""Study of commanded speeds: does what was learned at constant speeds hold while they change?"""
+"""Study of commanded speeds: does what was learned at constant speeds hold while they change, and
+can it be learned while they do?"""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ import pandas as pd
 from ..._typing import Array
 from ...control import (
     ControllerSpec,
+    InitialFeedforward,
     SpeedCommand,
     SpeedProfile,
     TorqueLibrary,
@@ -21,9 +23,9 @@ from ...errors import InvalidInput
 from ...gait import GaitLibrary, load_library
 from ...robot import JOINTS, Robot, load_robot
 from ..experiment import torque_library
-from ..simulation import Progress, Schedule, Simulation
+from ..simulation import Progress, Schedule, Simulation, simulate
 from ..world import Scenario
-from .learning_runs import COMPARED, learn
+from .learning_runs import COMPARED, learn, mean_peaks
 
 RAMPS = (
     *("0 4s, 0->0.8 8s, 0.8 4s, 0.8->0 8s, 0 4s", "0 4s, 0->0.8 2s, 0.8 4s, 0.8->0 2s, 0 4s"),
@@ -34,6 +36,11 @@ RAMPS = (
 DRIVERS = ("pd", "model", "library", "library+ilc")
 """Without feedforward, with the model's, with what was learned at constant speeds, and learning on
 from there."""
+
+SWEEPS = "0 4s, 0->0.8 8s, 0.8->-0.5 13s, -0.5->0.8 13s, 0.8->-0.5 13s, -0.5->0 5s"
+"""A minute over all speeds, twice to and fro."""
+
+_REPLAY = Schedule(0.5, 8.0, 0.0)
 
 _SETTLED = 2.0
 """Time after which the start is over [s]."""
@@ -203,4 +210,81 @@ def describe_driving(table: pd.DataFrame) -> str:
             )
             fell = "" if row.upright else "  fell"
             lines.append(f"{row.controller:<14}{calf:>14}{thigh:>14}{row.speed_error:>8.3f}{fell}")
+    return "\n".join(lines)
+
+
+def measure_wandering(
+    command: str, scenario: Scenario, *, robot: str = "a1", reference: str = "commanded"
+) -> pd.DataFrame:
+    """Learn from nothing while the speed changes, then replay at each speed what was learned.
+
+    Beside it what `ilc` learned at these speeds one by one, 28 s each, and no feedforward.
+
+    Args:
+        command: Speed profile of the learning, see `SpeedProfile.parse`.
+        scenario: The scenario.
+        robot: Short name of the robot.
+        reference: By which speed gaits are chosen, see `SpeedCommand`.
+
+    Returns:
+        A row for each speed of the robot's gaits: `speed` [m/s], and mean peaks from the true
+        contact on in calf and thigh, `none_calf`, `practised_calf`, `driven_calf` and the like
+        [rad]; NaN where a robot fell.
+    """
+    profile, machine, library = SpeedProfile.parse(command), load_robot(robot), load_library(robot)
+    learner, replay = replace(load_controller("ilc"), guard=None), load_controller("library")
+    following = SpeedCommand([profile], library, reference=reference)
+    Simulation(
+        machine,
+        following.first_gaits,
+        learner,
+        scenario,
+        schedule=Schedule(0.5, 0.0, profile.duration),
+        rng=np.random.default_rng(0),
+        command=following,
+    ).run()
+    gaits = [library.at(float(speed)) for speed in library.speeds]
+    planned = np.array([gait.flight.duration for gait in gaits])
+    memory = following.memory
+    practised = torque_library(learn(machine, gaits, load_controller("ilc"), scenario))
+    skills = {
+        "none": InitialFeedforward(),
+        "practised": InitialFeedforward(practised.torque, practised.flight),
+        "driven": InitialFeedforward(memory.feedforward[0], memory.stretch[0] * planned),
+    }
+    table: dict[str, list[float]] = {"speed": library.speeds.tolist()}
+    for name, skill in skills.items():
+        strides = simulate(
+            machine,
+            gaits,
+            replay,
+            scenario,
+            schedule=_REPLAY,
+            rng=np.random.default_rng(0),
+            initial=skill,
+        )
+        peaks = [mean_peaks(strides, k) for k in range(len(gaits))]
+        for joint in COMPARED:
+            table[f"{name}_{joint}"] = [float(peak[joint]) for peak in peaks]
+    return pd.DataFrame(table)
+
+
+def describe_wandering(table: pd.DataFrame) -> str:
+    """The table of `measure_wandering` as text, and what it comes to."""
+    kinds = ("none", "practised", "driven")
+    lines = [
+        "mean peaks of stance errors from the true contact on, calf and thigh [mrad]",
+        f"{'speed [m/s]':>11}{'nothing learned':>18}{'one by one':>18}{'while driving':>18}",
+    ]
+    for row in table.to_dict("records"):
+        cells = [f"{1e3 * row[f'{k}_calf']:.1f}, {1e3 * row[f'{k}_thigh']:.1f}" for k in kinds]
+        lines.append(f"{row['speed']:>11g}{cells[0]:>18}{cells[1]:>18}{cells[2]:>18}")
+    for joint in COMPARED[::-1]:
+        none, practised, driven = (table[f"{kind}_{joint}"] for kind in kinds)
+        share = ((none - driven) / (none - practised)).median()
+        lines.append(
+            f"{joint}: driving about took away {share:.0%} of what learning one by one did "
+            f"(median over {len(table)} speeds; worst {1e3 * driven.max():.1f} mrad beside "
+            f"{1e3 * practised.max():.1f})"
+        )
     return "\n".join(lines)
