@@ -1,4 +1,4 @@
-"""Commands about learning: `ilc analyze | stability | gains | transfer | seeding`."""
+"""Commands about learning: `ilc analyze`, `stability`, `gains`, `drive`, `wander` and others."""
 
 from __future__ import annotations
 
@@ -12,16 +12,23 @@ from .._checks import whole
 from ..compare import Results, load_scenario
 from ..compare.studies import (
     COUPLINGS,
+    DRIVERS,
+    RAMPS,
     STRIDES,
+    SWEEPS,
     compare_prediction,
+    describe_driving,
     describe_gains,
     describe_prediction,
     describe_seeding,
     describe_stability,
     describe_transfers,
+    describe_wandering,
+    measure_driving,
     measure_seeding,
     measure_stability,
     measure_transfers,
+    measure_wandering,
     simulate_learning,
     stored_learning,
     sweep_gains,
@@ -29,7 +36,13 @@ from ..compare.studies import (
 from ..control import load_controller
 from ..gait import Gait
 from ..viz import known_figure, save_figure
-from ..viz.figures import errors_by_seed, gains_figure, predicted_and_measured, transfers_figure
+from ..viz.figures import (
+    driving_figure,
+    errors_by_seed,
+    gains_figure,
+    predicted_and_measured,
+    transfers_figure,
+)
 
 
 @dataclass(frozen=True)
@@ -109,6 +122,58 @@ class Stability:
             spec, self.speed, scenario, couplings=self.couplings, robot=self.robot
         )
         print(describe_stability(table))
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Drive by commanded speeds with what was learned at constant ones, and with rivals.
+
+    Gaits are chosen anew at each stride, between those of the library: eq. (13) of the paper.
+    """
+
+    command: tuple[str, ...] = RAMPS
+    """Speed profiles, each in quotes: "0 4s, 0->0.8 2s, 0.8 4s", a speed [m/s] and how long, or two
+    with an arrow. Where a piece begins at another speed than the last ended, the command steps."""
+    controllers: tuple[str, ...] = DRIVERS
+    """Controllers."""
+    scenario: str = "nominal"
+    """Scenario, of the learning and of the driving."""
+    reference: str = "commanded"
+    """Speed by which gaits are chosen: commanded, or measured, that of the torso."""
+    robot: str = "a1"
+    """Robot."""
+    figure: Path = Path("driving.png")
+    """Figure to write: png, svg or pdf."""
+
+    def run(self) -> None:
+        """Do it."""
+        known_figure(self.figure)
+        table = measure_driving(
+            self.command,
+            load_scenario(self.scenario),
+            controllers=self.controllers,
+            robot=self.robot,
+            reference=self.reference,
+        )
+        print(describe_driving(table))
+        print(f"\nfigure  {save_figure(driving_figure(table), self.figure)}")
+
+
+@dataclass(frozen=True)
+class Wander:
+    """Learn from nothing while the speed changes, and say what that is worth at constant speeds."""
+
+    command: str = SWEEPS
+    """Speed profile of the learning, as in `pronk-pin ilc drive`."""
+    scenario: str = "nominal"
+    """Scenario."""
+    robot: str = "a1"
+    """Robot."""
+
+    def run(self) -> None:
+        """Do it."""
+        table = measure_wandering(self.command, load_scenario(self.scenario), robot=self.robot)
+        print(describe_wandering(table))
 
 
 @dataclass(frozen=True)
@@ -205,6 +270,8 @@ class Ilc:
         Annotated[Analyze, subcommand("analyze")]
         | Annotated[Stability, subcommand("stability")]
         | Annotated[Gains, subcommand("gains")]
+        | Annotated[Drive, subcommand("drive")]
+        | Annotated[Wander, subcommand("wander")]
         | Annotated[Transfer, subcommand("transfer")]
         | Annotated[Seeding, subcommand("seeding")]
     )

@@ -49,6 +49,7 @@ from .signals import (
     ImpactDetector,
     PhaseLog,
     Reference,
+    SpeedProfile,
     StanceContact,
     StrideRecord,
     Tape,
@@ -58,6 +59,7 @@ from .signals import (
     phase_grid,
     resample,
 )
+from .speed_command import REFERENCES, SpeedCommand, SpeedMemory
 from .tick_control import (
     BindableTickController,
     ComputedTorque,
@@ -74,6 +76,7 @@ __all__ = [
     "BASES",
     "CONTROLLERS",
     "PARTS",
+    "REFERENCES",
     "SAMPLES",
     "SKIPPED",
     "AttitudeEstimator",
@@ -110,6 +113,9 @@ __all__ = [
     "PlantInversionILC",
     "Reference",
     "SetPoints",
+    "SpeedCommand",
+    "SpeedMemory",
+    "SpeedProfile",
     "StanceContact",
     "StrideRecord",
     "StrideSelection",

@@ -44,6 +44,7 @@ from .signals import (
     phase_grid,
     resample,
 )
+from .speed_command import SpeedCommand, lift_off_speed
 from .tick_control import ControlTime, TickLoop
 
 LATEST_TOUCHDOWN = 2.0
@@ -80,6 +81,8 @@ class Controller:
     A stride is `touchdown`, then `liftoff` with what was measured in stance, then `landing` with
     what was measured in flight.
 
+    With a `command` the gaits change at each stride, and what is learned is stored by speed.
+
     Attributes:
         feedforward: The feedforward in use, on the phase grids of stance and flight [N m], shape
             (n, 2, samples, 12).
@@ -102,6 +105,7 @@ class Controller:
         feedforward: Array | None = None,
         flight: Array | None = None,
         base: str = "locked",
+        command: SpeedCommand | None = None,
     ) -> None:
         gaits = known_gaits(robot, gaits)
         instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
@@ -120,8 +124,16 @@ class Controller:
         self._estimator = SpeedEstimator(
             robot, n, time_constant=spec.speed_filter, timestep=timestep
         )
-        self._stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
-        self._flight = Reference.of([gait.flight for gait in gaits], timestep, LATEST_TOUCHDOWN)
+        others = () if command is None else command.all_gaits
+        self._stance = Reference.of(
+            [gait.stance for gait in gaits], timestep, 1.0, others=[gait.stance for gait in others]
+        )
+        self._flight = Reference.of(
+            [gait.flight for gait in gaits],
+            timestep,
+            LATEST_TOUCHDOWN,
+            others=[gait.flight for gait in others],
+        )
         self._flight_measured = self._flight.planned.copy()  # how long the last flights lasted
         if flight is not None:
             self._flight.stretch(np.arange(n), as_array("flight", flight, n, ()))
@@ -138,10 +150,10 @@ class Controller:
             self.guard = GuardState(spec.guard, Memory(self.feedforward, self._flight.duration))
         self._always_retimes = flight is None and not any(self._laws)
         self._thigh = leg_geometry(robot).sense[:, 1]  # sense in which the thighs turn legs back
-        end = np.array([1.0])
-        self._lift_off_speed = np.array(
-            [gait.stance.base_reference(end)[1][0, 0] for gait in gaits]
-        )
+        self._lift_off_speed = np.array([lift_off_speed(gait) for gait in gaits])
+        self._command = self._followed(command)
+        self._landing_gaits = list(self.gaits)  # those that are flown to
+        self._standing_speed = np.array([gait.speed for gait in gaits])
 
     def _context(self) -> LawContext:
         """What balance and the law of the stance are bound to."""
@@ -174,7 +186,7 @@ class Controller:
     @property
     def max_ticks(self) -> int:
         """Length of the longest tape [ticks]."""
-        return int(max(self._stance.ticks.max(), self._flight.ticks.max()))
+        return int(max(self._stance.phase.shape[1], self._flight.phase.shape[1]))
 
     def stand(self, ticks: int = 1) -> Tape:
         """Tapes of the start-up: every robot holds the posture in which its stance begins."""
@@ -186,7 +198,11 @@ class Controller:
         return Tape(zero, position, zero, length, acceleration=zero, phase=phase)
 
     def touchdown(
-        self, rows: IntArray, learning: BoolArray | None = None, *, late: int | None = None
+        self,
+        rows: IntArray,
+        learning: BoolArray | None = None,
+        *,
+        late: int | None = None,
     ) -> Tape:
         """Learn from the last stride of robots that touched down, and write their stance tapes.
 
@@ -197,12 +213,14 @@ class Controller:
             late: Ticks ago that they touched down; by default those of the specification.
         """
         usable = self.skipped[rows] == 0
+        before = Memory(self.feedforward[rows], self._flight.duration[rows])
         learns = np.zeros(len(rows), dtype=bool)
         if learning is not None:
             learns = usable & learning
             learns[learning] &= ~self._roll_back(rows[learning], usable[learning])
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
+        self._change_stances(rows, before)
         reference, position = self._stance, self._stance.position[rows]
         acceleration, phase = self._of_the_tick(reference, rows, slice(None))
         return Tape(
@@ -215,6 +233,66 @@ class Controller:
             phase=phase,
         )
 
+    def _followed(self, command: SpeedCommand | None) -> SpeedCommand | None:
+        """A command that this controller can follow.
+
+        Raises:
+            InvalidInput: It cannot.
+        """
+        if command is not None and (self.balance is not None or self.guard is not None):
+            raise InvalidInput(
+                f"controller '{self.spec.name}' cannot change its gait: what balances a trunk that "
+                "may turn, and the guard of the learning, are of one gait; use base 'locked', and "
+                "a controller with guard=None"
+            )
+        return command
+
+    def _change_flights(
+        self, command: SpeedCommand, rows: IntArray, commanded: Array, measured: Array
+    ) -> None:
+        """Fly to the touchdowns of other gaits."""
+        change = command.change(rows, commanded, measured)
+        self._flight.change(rows, [gait.flight for gait in change.gaits], LATEST_TOUCHDOWN)
+        stretch = command.memory.stretch_at(rows, change.speed)
+        self._flight.stretch(rows, stretch * self._flight.planned[rows])
+        self._lift_off_speed[rows] = change.lift_off_speed
+        self.feedforward[rows, 1] = command.memory.at(rows, change.speed, 1)
+        for row, gait in zip(rows, change.gaits, strict=True):
+            self._landing_gaits[row] = gait
+
+    def _change_stances(self, rows: IntArray, before: Memory) -> None:
+        """Stand in the gaits that were flown to, after what came on top of the torques and timings
+        `before` was stored."""
+        command = self._command
+        if command is None:
+            return
+        memory, landed = command.memory, command.speed[rows]
+        learned = self.feedforward[rows] - before.feedforward
+        memory.teach(rows, self._standing_speed[rows], 0, learned[:, 0])
+        memory.teach(rows, landed, 1, learned[:, 1])
+        longer = (self._flight.duration[rows] - before.flight) / self._flight.planned[rows]
+        memory.teach_stretch(rows, landed, longer)
+        self._standing_speed[rows] = landed
+        self.feedforward[rows, 0] = memory.at(rows, landed, 0)
+        self._stance.change(rows, [self._landing_gaits[row].stance for row in rows], 1.0)
+        self.gaits = tuple(self._landing_gaits)
+
+    def _joined(
+        self, rows: IntArray, began: Array, position: Array, velocity: Array
+    ) -> tuple[Array, Array]:
+        """Flights that begin where those of the gaits before do (m, 12), and go over to their own.
+
+        What lies between goes as the regulation comes, with `1 - profile`.
+        """
+        reference = self._flight
+        phase = reference.phase[rows, : position.shape[1]]
+        share, rate = self.spec.regulator.profile(phase)
+        between = (began - reference.position[rows, 0])[:, None]
+        return (
+            position + (1.0 - share)[..., None] * between,
+            velocity - (rate / reference.duration[rows, None])[..., None] * between,
+        )
+
     def _of_the_tick(
         self, reference: Reference, rows: IntArray, ticks: slice
     ) -> tuple[Array | None, Array | None]:
@@ -223,8 +301,20 @@ class Controller:
             return None, None
         return reference.acceleration(rows, ticks), reference.phase[rows, ticks]
 
-    def liftoff(self, rows: IntArray, log: PhaseLog) -> tuple[Tape, StrideRecord]:
-        """Write the flight tapes of robots that have just finished a stance, and its record."""
+    def liftoff(
+        self,
+        rows: IntArray,
+        log: PhaseLog,
+        commanded: Array | None = None,
+    ) -> tuple[Tape, StrideRecord]:
+        """Write the flight tapes of robots that have just finished a stance, and its record.
+
+        Args:
+            rows: Which robots.
+            log: What was measured in stance.
+            commanded: Speeds that are commanded for their landing (m,) [m/s], where there is a
+                command. Flights go over to the gaits of them from where the stances ended.
+        """
         record = self.record(0, rows, log)
         self._last[0].put(rows, self._learnable(record, rows, log))
         self._stance_verdict[rows] = self._judge_contact(log)
@@ -232,6 +322,9 @@ class Controller:
         speed = self._estimator.update(rows, log)
         if self.balance is not None:
             self.balance.lift_off(rows, self._estimator.sideways[rows])
+        began = self._flight.position[rows, 0]  # where the stances end
+        if self._command is not None and commanded is not None:
+            self._change_flights(self._command, rows, commanded, speed)
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         reference = self._flight
         ticks = slice(int(_LATE_TOUCHDOWN * reference.ends(rows).max()))
@@ -240,6 +333,8 @@ class Controller:
         position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
         velocity = reference.velocity[rows, ticks]
         velocity[..., 1::3] += self._thigh * rate[..., None]
+        if commanded is not None:
+            position, velocity = self._joined(rows, began, position, velocity)
         acceleration, phase = self._of_the_tick(reference, rows, ticks)
         if acceleration is not None and phase is not None:
             curvature = self.spec.regulator.profile_curvature(phase)

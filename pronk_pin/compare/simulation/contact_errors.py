@@ -27,13 +27,22 @@ class ContactErrors:
     Args:
         gaits: The gait of each of the n robots.
         timestep: Length of a tick [s].
+        others: Gaits that robots may change to.
     """
 
-    def __init__(self, gaits: Sequence[Gait], timestep: float) -> None:
-        stance = Reference.of([gait.stance for gait in gaits], timestep, 1.0)
-        self._position, self._ticks = stance.position, stance.ticks
+    def __init__(
+        self, gaits: Sequence[Gait], timestep: float, *, others: Sequence[Gait] = ()
+    ) -> None:
+        self._stance = Reference.of(
+            [gait.stance for gait in gaits], timestep, 1.0, others=[gait.stance for gait in others]
+        )
+        self._position, self._ticks = self._stance.position, self._stance.ticks
         self._joints = np.full((len(gaits), _BEFORE, self._position.shape[-1]), np.nan)
         self._loaded = np.zeros((len(gaits), _BEFORE), dtype=bool)
+
+    def change(self, rows: IntArray, gaits: Sequence[Gait]) -> None:
+        """Take other gaits for robots from now on."""
+        self._stance.change(rows, [gait.stance for gait in gaits], 1.0)
 
     def flight(self, rows: IntArray, joints: Array, force: Array, length: IntArray) -> None:
         """Keep the last ticks of some robots' flights.

@@ -160,26 +160,39 @@ class StrideLog:
         gaits: The gait of each robot.
         duration: How long is simulated [s].
         timestep: Length of a tick [s].
+        others: Gaits that robots may change to.
 
     Attributes:
         count: Strides that each robot has finished, shape (n,).
+        commanded: Commanded speed at the beginning of each stride [m/s], and
+        gait_speed: speed of its gait [m/s], where they change, shape (n, strides); NaN elsewhere.
     """
 
-    def __init__(self, gaits: Sequence[Gait], duration: float, timestep: float) -> None:
+    def __init__(
+        self,
+        gaits: Sequence[Gait],
+        duration: float,
+        timestep: float,
+        *,
+        others: Sequence[Gait] = (),
+    ) -> None:
         n = len(gaits)
         parts = [[getattr(gait, part).duration for gait in gaits] for part in PARTS]
         self._planned = np.array(parts)  # (2, n)
         whole = self._planned.sum(axis=0)
+        shortest = min(gait.duration for gait in (*gaits, *others))
         self._timestep = timestep
         self._grid = phase_grid(SAMPLES)
         self._begin_x = np.zeros(n)
-        self._contact = ContactErrors(gaits, timestep)
+        self._contact = ContactErrors(gaits, timestep, others=others)
         self.count = np.zeros(n, dtype=np.intp)
         # Ticks are kept in turn, and only near the end of the simulation.
         self._near = (LAST + 1) * LONGEST_PART * whole
         self._close = np.zeros(n, dtype=bool)
-        self._strides = int(np.ceil(duration / (SHORTEST_STRIDE * whole.min()))) + 1
-        ticks = int(np.ceil(LONGEST_PART * self._planned.max() / timestep))
+        self._strides = int(np.ceil(duration / (SHORTEST_STRIDE * shortest))) + 1
+        self.commanded, self.gait_speed = np.full((2, n, self._strides), np.nan)
+        longest = max(getattr(gait, part).duration for gait in (*gaits, *others) for part in PARTS)
+        ticks = int(np.ceil(LONGEST_PART * longest / timestep))
         sizes = {"speed": n, "stride": self._strides, "tick": ticks, **sizes_of(gaits[0])}
         self._arrays = {each.name: each.empty(sizes) for each in STRIDE_QUANTITIES}
         self._ticks = {each.name: each.empty(sizes) for each in TICK_QUANTITIES}
@@ -187,6 +200,14 @@ class StrideLog:
     def __getitem__(self, name: str) -> npt.NDArray[np.floating[Any]]:
         """The array of a quantity of the strides."""
         return self._arrays[name]
+
+    def change(self, rows: IntArray, gaits: Sequence[Gait], commanded: Array) -> None:
+        """Take other gaits for robots from the stride on that begins, at commanded speeds (m,)."""
+        at = rows, self.count[rows]
+        self.commanded[at], self.gait_speed[at] = commanded, [gait.speed for gait in gaits]
+        for part, name in enumerate(PARTS):
+            self._planned[part, rows] = [getattr(gait, name).duration for gait in gaits]
+        self._contact.change(rows, gaits)
 
     def begin(self, rows: IntArray, start: Array, learning: BoolArray, *, remaining: Array) -> None:
         """Begin strides at the times `start` (m,) [s], with `remaining` (m,) [s] to go."""

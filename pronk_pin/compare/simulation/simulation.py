@@ -15,7 +15,13 @@ import xarray as xr
 
 from ..._checks import Interval, flag, instance_of, known_name, whole
 from ..._typing import Array, IntArray
-from ...control import Controller, ControllerSpec, ControlTime, InitialFeedforward
+from ...control import (
+    Controller,
+    ControllerSpec,
+    ControlTime,
+    InitialFeedforward,
+    SpeedCommand,
+)
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
 from ...robot import BASES, Robot
@@ -54,6 +60,8 @@ class Simulation:
         threads: Threads that share the robots, whose trunks must be locked for that: each goes
             through the strides of its own ones, and what one computes hides behind the others'
             physics. By default the caller's only, as simulations run side by side in processes.
+        command: Commanded speeds, for which the robots' gaits change at each stride, on a locked
+            base; by default they keep theirs. Their first gaits are `command.first_gaits`.
     """
 
     def __init__(
@@ -70,6 +78,7 @@ class Simulation:
         base: str = "locked",
         chunked: bool = True,
         threads: int = 1,
+        command: SpeedCommand | None = None,
     ) -> None:
         gaits = known_gaits(robot, gaits)
         instance_of("scenario", scenario, Scenario, "a Scenario, as load_scenario() returns it")
@@ -84,8 +93,16 @@ class Simulation:
             raise InvalidInput("threads must be 1 or more, and 1 where the base is not locked")
         self.schedule, self._gaits, self._dt = schedule, tuple(gaits), dt
         self.controller = Controller(
-            robot, gaits, spec, timestep=dt, feedforward=feedforward, flight=flight, base=base
+            robot,
+            gaits,
+            spec,
+            timestep=dt,
+            feedforward=feedforward,
+            flight=flight,
+            base=base,
+            command=command,
         )
+        self._command = command
         self._threads = threads
         self.player = Player(
             robot,
@@ -100,7 +117,9 @@ class Simulation:
             chunked=chunked,
         )
         self.world, self.upright = self.player.world, self.player.upright
-        self.strides = StrideLog(gaits, schedule.duration, dt)
+        self.strides = StrideLog(
+            gaits, schedule.duration, dt, others=() if command is None else command.all_gaits
+        )
         self._clock = np.zeros(n, dtype=np.intp)  # ticks since the first stride began
         self._stand(robot, rng)
 
@@ -183,10 +202,16 @@ class Simulation:
 
         with controller.time.measured():
             tape = controller.touchdown(rows, learning, late=late)
+        if self._command is not None:
+            gaits = [controller.gaits[row] for row in rows]
+            commanded = self._command.commanded(rows, self._seconds(start))
+            strides.change(rows, gaits, commanded)
         stance = player.play(rows, tape, part=0)
         measured_log = player.measured(rows, stance, sensed=late)
         with controller.time.measured():
-            tape, record = controller.liftoff(rows, measured_log)
+            tape, record = controller.liftoff(
+                rows, measured_log, self._commanded(rows, start + stance)
+            )
         if player.sensed is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, sensed=late))
         strides.stance(rows, record, log, stance)
@@ -215,6 +240,13 @@ class Simulation:
             flight_reference=controller.flight[rows],
         )
         self._clock[rows] = start + stance + flight
+
+    def _commanded(self, rows: IntArray, clock: IntArray) -> Array | None:
+        """Speeds that are commanded when robots land that lift off now; None without a command."""
+        if self._command is None:
+            return None
+        landing = self._seconds(clock) + self.controller.flight[rows]
+        return self._command.commanded(rows, landing)
 
     def _seconds(self, ticks: IntArray) -> Array:
         return np.asarray(ticks * self._dt, dtype=float)

@@ -5,6 +5,16 @@ Goes out: gain reduction, seeding, transfer, stability, prediction, reproduction
 loop closed with an identified model.
 """
 
+from .driving import (
+    DRIVERS,
+    RAMPS,
+    SWEEPS,
+    describe_driving,
+    describe_wandering,
+    measure_driving,
+    measure_wandering,
+    summarize_driving,
+)
 from .gain_reduction import describe_gains, sweep_gains
 from .identified_models import close_loop, format_loop
 from .prediction import (
@@ -22,23 +32,31 @@ from .transfer import TOLERANCE, describe_transfers, measure_transfers
 
 __all__ = [
     "COUPLINGS",
+    "DRIVERS",
+    "RAMPS",
     "STRIDES",
+    "SWEEPS",
     "TOLERANCE",
     "Prediction",
     "close_loop",
     "compare_prediction",
+    "describe_driving",
     "describe_gains",
     "describe_prediction",
     "describe_seeding",
     "describe_stability",
     "describe_transfers",
+    "describe_wandering",
     "format_loop",
     "format_reproduction",
+    "measure_driving",
     "measure_seeding",
     "measure_stability",
     "measure_transfers",
+    "measure_wandering",
     "simulate_learning",
     "stayed_up",
     "stored_learning",
+    "summarize_driving",
     "sweep_gains",
 ]

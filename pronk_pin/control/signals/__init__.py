@@ -9,6 +9,7 @@ from .context import ControlContext
 from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, first_order, look_ahead
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
 from .reference import FlightTiming, Reference
+from .speed_profile import SpeedProfile
 from .tape import Gains, Tape, clip_torque
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "ImpactDetector",
     "PhaseLog",
     "Reference",
+    "SpeedProfile",
     "StanceContact",
     "StrideRecord",
     "Tape",

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._checks import SHARE, Interval, keep_reals
 from ..._typing import Array, IntArray
+from ...errors import InvalidInput
 from ...gait import GaitPhase
 
 _NOTICED = 2e-5
@@ -58,7 +59,7 @@ class Reference:
         velocity: Joint velocities [rad/s], zero where the phase is held, shape (n, ticks, 12).
     """
 
-    parts: tuple[GaitPhase, ...]
+    parts: list[GaitPhase]
     timestep: float
     planned: Array
     duration: Array
@@ -68,18 +69,47 @@ class Reference:
     velocity: Array
 
     @classmethod
-    def of(cls, parts: Sequence[GaitPhase], timestep: float, latest: float) -> Reference:
-        """Tabulate one part of each gait, for up to `latest` times its planned duration."""
+    def of(
+        cls,
+        parts: Sequence[GaitPhase],
+        timestep: float,
+        latest: float,
+        *,
+        others: Sequence[GaitPhase] = (),
+    ) -> Reference:
+        """Tabulate one part of each gait, for up to `latest` times its planned duration.
+
+        There is room for those `others`, which `change` may bring.
+        """
         planned = np.array([part.duration for part in parts])
         ticks = np.round(latest * planned / timestep).astype(np.intp)
-        shape = (len(parts), int(ticks.max()))
+        longest = max([planned.max(), *(part.duration for part in others)])
+        shape = (len(parts), int(np.round(latest * longest / timestep)))
         joints = parts[0].joint_reference(np.zeros(1))[0].shape[1]
         curves = (np.empty((*shape, joints)) for _ in range(2))
         reference = cls(
-            tuple(parts), timestep, planned, planned.copy(), ticks, np.empty(shape), *curves
+            list(parts), timestep, planned, planned.copy(), ticks, np.empty(shape), *curves
         )
         reference._tabulate(np.arange(len(parts)))
         return reference
+
+    def change(self, rows: IntArray, parts: Sequence[GaitPhase], latest: float) -> None:
+        """Change some robots to another gait's part, stretched as theirs was.
+
+        Raises:
+            InvalidInput: A part is longer than those that there is room for.
+        """
+        for row, part in zip(rows, parts, strict=True):
+            ticks = int(np.round(latest * part.duration / self.timestep))
+            if ticks > self.phase.shape[1]:
+                raise InvalidInput(
+                    f"a {part.name} of {part.duration:g} s is longer than any that was announced; "
+                    "name its gait among those that may be changed to"
+                )
+            stretched = self.duration[row] / self.planned[row]
+            self.parts[row], self.planned[row], self.ticks[row] = part, part.duration, ticks
+            self.duration[row] = stretched * part.duration
+        self._tabulate(rows)
 
     def stretch(self, rows: IntArray, duration: Array) -> None:
         """Stretch the references of some robots to durations (m,) [s]; postures stay the same."""

@@ -4,6 +4,7 @@ Comes in: summaries, strides, gaits, explanations.
 Goes out: figures, or files of them.
 """
 
+from .driving_figure import driving_figure
 from .explanation_figure import write_explanation_figure
 from .gait_figures import write_gait_figures
 from .knowledge_figure import knowledge_ladder, shows_knowledge
@@ -23,6 +24,7 @@ from .tracking_figures import (
 __all__ = [
     "LABELS",
     "by_scenario",
+    "driving_figure",
     "errors_by_seed",
     "errors_by_speed",
     "gains_figure",
