@@ -126,7 +126,10 @@ def _merge_impossible_inertias(root: ElementTree.Element) -> None:
     bearing = {joint.child: joint for joint in fixed}
 
     def depth(name: str) -> int:
-        return 1 + depth(bearing[name].parent) if name in bearing else 0
+        count = 0
+        while name in bearing:
+            name, count = bearing[name].parent, count + 1
+        return count
 
     cause: dict[str, str] = {}
     for name in sorted(links, key=depth, reverse=True):  # what hangs from others comes first
