@@ -68,6 +68,7 @@ from .tick_control import (
     TickController,
     TickLoop,
     WholeBodyQP,
+    level_robot,
 )
 
 __all__ = [
@@ -126,6 +127,7 @@ __all__ = [
     "attitude_angle",
     "attitude_error",
     "clip_torque",
+    "level_robot",
     "lifted_model",
     "load_controller",
     "model_feedforward",
