@@ -25,6 +25,9 @@ _USE_STEPS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 _USUAL_HEIGHT = 0.36
 """Height of a standing trunk up to which the camera need not step back [m]."""
 
+_USUAL_LENGTH = 0.4
+"""Distance of front hips from rear ones up to which it need not, either [m]."""
+
 
 def robot_blob(scene: Scene) -> bytes:
     """Static part of a scene for the page: shapes, joints, names, colours."""
@@ -58,7 +61,7 @@ def robot_blob(scene: Scene) -> bytes:
             "shown": _shown_joint(robot),
             "legs": list(robot.legs),
             "footRadius": robot.foot_radius,
-            "size": max(1.0, float(robot.standing[2]) / _USUAL_HEIGHT),
+            "size": _size(robot),
             "torqueLimits": robot.tau_max.tolist(),
             "scale": [to_hex(c) for c in colormaps[SEQUENTIAL](np.linspace(0.0, 1.0, 32))],
         }
@@ -128,6 +131,14 @@ def _end(
 def _matrix(pose: Array) -> list[float]:
     """A pose by columns, as three.js takes it."""
     return [float(value) for value in pose.T.ravel()]
+
+
+def _size(robot: Robot) -> float:
+    """How much farther the camera stands from a robot that is higher or longer than usual."""
+    hips = [robot.model.getJointId(robot.spec.leg_joints(leg)[0]) for leg in robot.legs]
+    along = [float(robot.model.jointPlacements[hip].translation[0]) for hip in hips]
+    length = max(along) - min(along)
+    return max(1.0, float(robot.standing[2]) / _USUAL_HEIGHT, length / _USUAL_LENGTH)
 
 
 def _shown_joint(robot: Robot) -> int:
