@@ -65,8 +65,8 @@ class SpeedOutOfRange(PronkError):
         highest: float,
         *,
         library: str = "gait library",
-        remedy: str = "make a library with it by 'pronk-pin gaits build', to be looked at with "
-        "--library (comparisons play the shipped one)",
+        remedy: str = "make a library with it by 'pronk-pin gaits build', and give its file to "
+        "compare with --gaits, or to gaits with --library",
     ) -> None:
         self.speed, self.lowest, self.highest = speed, lowest, highest
         super().__init__(

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, subcommand
 
 from .._checks import shown
-from ..errors import InvalidInput
+from ..errors import InvalidInput, UnknownName
 from ..gait import (
     GaitLibrary,
     build_library,
@@ -19,7 +19,7 @@ from ..gait import (
     load_library,
     number_range,
 )
-from ..robot import load_robot
+from ..robot import Robot, load_robot, load_robot_spec
 from ..viz.figures import write_gait_figures
 
 
@@ -32,7 +32,7 @@ class Build:
     """
 
     robot: str = "a1"
-    """Robot."""
+    """Robot: its name, or the TOML file of one of your own."""
     gait: str = "pronk"
     """Gait style: pronk or bound."""
     base: str | None = None
@@ -81,7 +81,7 @@ class _OfLibrary:
     library: Path | None = None
     """Library file; by default the shipped one."""
     robot: str = "a1"
-    """Robot whose shipped library it is."""
+    """Robot whose library it is: its name, or the TOML file of one of your own."""
     gait: str = "pronk"
     """Gait style of the shipped library: pronk or bound."""
     base: str | None = None
@@ -106,7 +106,8 @@ class Show(_OfLibrary):
             shown_gaits = library if self.apex is None else library.at_apex(self.apex)
             print(describe_library(shown_gaits))
         else:
-            print(describe_gait(library, self.speed, self.apex))
+            robot = robot_of(library, self.robot)
+            print(describe_gait(library, self.speed, self.apex, robot=robot))
 
 
 @dataclass(frozen=True)
@@ -122,8 +123,14 @@ class Plot(_OfLibrary):
 
     def run(self) -> None:
         """Do it."""
+        library = self.load()
         paths = write_gait_figures(
-            self.load(), self.folder, speed=self.speed, apex=self.apex, suffix=self.format
+            library,
+            self.folder,
+            speed=self.speed,
+            apex=self.apex,
+            suffix=self.format,
+            robot=robot_of(library, self.robot),
         )
         for path in paths:
             print(f"figure  {path}")
@@ -148,7 +155,30 @@ def open_library(
     path: Path | None, robot: str, gait: str, base: str | None, *, audited: bool = True
 ) -> GaitLibrary:
     """A library from a file, or one that is shipped."""
-    if path is not None:
-        return GaitLibrary.load(path, audited=audited)
-    load_robot(robot)
-    return load_library(robot, gait=gait, base=None if base is None else known_base(base))
+    machine = load_robot(robot)
+    if path is None:
+        return load_library(
+            machine.name, gait=gait, base=None if base is None else known_base(base)
+        )
+    library = GaitLibrary.load(path, audited=audited)
+    if library.robot == machine.name:
+        library = GaitLibrary.load(path, robot=machine, audited=audited)
+    return library
+
+
+def robot_of(library: GaitLibrary, robot: str) -> Robot:
+    """The robot of a library: the one that is named, if it is, or the one known by its name.
+
+    Raises:
+        InvalidInput: It is neither.
+    """
+    spec = load_robot_spec(robot)
+    if spec.name == library.robot:
+        return load_robot(spec)
+    try:
+        return load_robot(library.robot)
+    except UnknownName as error:
+        raise InvalidInput(
+            f"these are gaits of {library.robot}, which is no robot that is known by name; give "
+            "its file, --robot FILE.toml"
+        ) from error

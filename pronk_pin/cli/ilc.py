@@ -34,7 +34,8 @@ from ..compare.studies import (
     sweep_gains,
 )
 from ..control import load_controller
-from ..gait import Gait
+from ..gait import Gait, load_library
+from ..robot import load_robot
 from ..viz import known_figure, save_figure
 from ..viz.figures import (
     driving_figure,
@@ -43,6 +44,15 @@ from ..viz.figures import (
     predicted_and_measured,
     transfers_figure,
 )
+
+_FINE = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
+"""Speeds [m/s] of studies that need neighbours."""
+
+
+def _covered(robot: str, speeds: tuple[float, ...]) -> tuple[float, ...]:
+    """Those of some speeds [m/s] that the gaits shipped for a robot cover."""
+    covered = load_library(load_robot(robot).name).speeds
+    return tuple(speed for speed in speeds if covered[0] <= speed <= covered[-1])
 
 
 @dataclass(frozen=True)
@@ -106,8 +116,8 @@ class Stability:
 
     controller: Positional[str] = "ilc"
     """Controller whose learning is analysed."""
-    speed: tuple[float, ...] = (0.6, 0.8)
-    """Speeds [m/s]."""
+    speed: tuple[float, ...] = ()
+    """Speeds [m/s]; by default 0.6 and 0.8, if the robot's gaits cover them."""
     scenario: str = "payload+delay"
     """Scenario of the learning."""
     couplings: tuple[float, ...] = COUPLINGS
@@ -118,8 +128,9 @@ class Stability:
     def run(self) -> None:
         """Do it."""
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
+        speeds = self.speed or _covered(self.robot, (0.6, 0.8))
         table = measure_stability(
-            spec, self.speed, scenario, couplings=self.couplings, robot=self.robot
+            spec, speeds, scenario, couplings=self.couplings, robot=self.robot
         )
         print(describe_stability(table))
 
@@ -185,8 +196,8 @@ class Gains:
 
     controller: Positional[str] = "ilc"
     """Controller that learns."""
-    speed: tuple[float, ...] = (-0.4, 0.0, 0.4, 0.8)
-    """Speeds [m/s]."""
+    speed: tuple[float, ...] = ()
+    """Speeds [m/s]; by default -0.4 to 0.8 in steps of 0.4, as far as the robot's gaits go."""
     scenario: str = "nominal"
     """Scenario of the learning."""
     robot: str = "a1"
@@ -198,7 +209,8 @@ class Gains:
         """Do it."""
         known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
-        table = sweep_gains(spec, self.speed, scenario, robot=self.robot)
+        speeds = self.speed or _covered(self.robot, (-0.4, 0.0, 0.4, 0.8))
+        table = sweep_gains(spec, speeds, scenario, robot=self.robot)
         print(describe_gains(table))
         print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
 
@@ -213,8 +225,9 @@ class Transfer:
 
     controller: Positional[str] = "ilc"
     """Controller that learns."""
-    speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
-    """Speeds [m/s], increasing."""
+    speed: tuple[float, ...] = ()
+    """Speeds [m/s], increasing; by default -0.4 to 0.8 in steps of 0.2, as far as the robot's
+    gaits go."""
     scenario: str = "nominal"
     """Scenario of the learning."""
     scenarios: tuple[str, ...] = ("payload", "weak-motors", "soft-ground", "slope", "gravity")
@@ -229,7 +242,7 @@ class Transfer:
         known_figure(self.figure)
         table = measure_transfers(
             load_controller(self.controller),
-            self.speed,
+            self.speed or _covered(self.robot, _FINE),
             load_scenario(self.scenario),
             [load_scenario(name) for name in self.scenarios],
             robot=self.robot,
@@ -245,8 +258,9 @@ class Seeding:
     The torque library learns at all speeds; each inner one begins with its neighbours' torques.
     """
 
-    speed: tuple[float, ...] = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
-    """Speeds [m/s], increasing."""
+    speed: tuple[float, ...] = ()
+    """Speeds [m/s], increasing; by default -0.4 to 0.8 in steps of 0.2, as far as the robot's
+    gaits go."""
     scenario: str = "nominal"
     """Scenario of the learning."""
     robot: str = "a1"
@@ -257,7 +271,8 @@ class Seeding:
     def run(self) -> None:
         """Do it."""
         known_figure(self.figure)
-        table = measure_seeding(self.speed, load_scenario(self.scenario), robot=self.robot)
+        speeds = self.speed or _covered(self.robot, _FINE)
+        table = measure_seeding(speeds, load_scenario(self.scenario), robot=self.robot)
         print(describe_seeding(table))
         print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
 

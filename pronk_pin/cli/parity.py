@@ -26,7 +26,7 @@ class Parity:
     model: Positional[Path | None] = None
     """MJCF or URDF to compare with."""
     robot: str = "a1"
-    """Robot it should be."""
+    """Robot it should be: its name, or the TOML file of one of your own."""
     states: int = 200
     """Number of random states."""
     seed: int = 0

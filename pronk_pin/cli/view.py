@@ -14,7 +14,7 @@ from ..errors import FileProblem, InvalidInput
 from ..viz import Film, Menu, library_menu, serve, write_film, write_png, write_replay
 from ..viz.player import DURATION, known_port
 from ..viz.scenes import result_menu
-from .gaits import open_library
+from .gaits import open_library, robot_of
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class View:
     """Show the dozen strides of a result with this one; by default those around the start of
     learning."""
     robot: str = "a1"
-    """Robot whose shipped gaits are shown."""
+    """Robot whose gaits are shown: its name, or the TOML file of one of your own."""
     gait: str = "pronk"
     """Style of its shipped gaits: pronk or bound."""
     base: str | None = None
@@ -113,8 +113,7 @@ class View:
                 "build --output'",
             )
         self._refuse(("controller", "scenario", "beside", "stride"), "a results folder")
+        library = open_library(self.what, self.robot, self.gait, self.base)
         return library_menu(
-            open_library(self.what, self.robot, self.gait, self.base),
-            speed=self.speed,
-            apex=self.apex,
+            library, speed=self.speed, apex=self.apex, robot=robot_of(library, self.robot)
         )

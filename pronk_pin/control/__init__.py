@@ -70,6 +70,7 @@ from .tick_control import (
     TickController,
     TickLoop,
     WholeBodyQP,
+    level_robot,
 )
 
 __all__ = [
@@ -132,6 +133,7 @@ __all__ = [
     "attitude_angle",
     "attitude_error",
     "clip_torque",
+    "level_robot",
     "lifted_model",
     "load_controller",
     "model_feedforward",

@@ -29,15 +29,14 @@ from .._checks import reals, worker_count
 from .._typing import Array
 from .._workers import begin_worker, leave_main_to_parent, unguarded_script
 from ..errors import FileProblem, GaitNotFound, InvalidInput, NoMainGuard, WorkerLost
-from ..kinematics import mirror
-from ..robot import Base, Robot, RobotSpec, as_robot, load_robot
+from ..robot import Base, Robot, RobotSpec, load_robot
 from ..storage import clear_partial_files, read_arrays, temporary_folder, write_arrays
 from .audit import audit, bezier_orders
 from .checks import RESOLUTION
 from .library import PER_GAIT, SCHEMA, GaitLibrary, from_arrays, to_arrays
 from .optimisation import GaitSolution, SolverState, check_ballistics, optimize_gait
 from .problem import GaitProblem
-from .style import gait_problem, load_style
+from .style import check_robot, gait_problem, load_style
 
 _PACKAGES = ("casadi", "pin", "numpy", "scipy", "example-robot-data")
 
@@ -98,7 +97,7 @@ def build_library(
     leave_main_to_parent()
     began = time.perf_counter()
     style = load_style(gait)
-    mirror(as_robot(robot))  # before all else: legs that gaits can be made for
+    check_robot(robot)  # before all else
     apex = style.apex_of(robot)
     speeds = reals("speeds", style.speeds if speeds is None else speeds)
     apexes = reals("apex", (apex,) if apexes is None else apexes)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..errors import InvalidInput
+from ..robot import Robot
 from .library import GaitLibrary, known_library
 
 
@@ -42,8 +43,16 @@ def describe_library(library: GaitLibrary) -> str:
     return "\n".join(lines)
 
 
-def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None) -> str:
+def describe_gait(
+    library: GaitLibrary, speed: float, apex: float | None = None, *, robot: Robot | None = None
+) -> str:
     """Format one gait: its phases, residuals, and its audit if it is one of the library's.
+
+    Args:
+        library: The library.
+        speed: Speed [m/s].
+        apex: Greatest height of the trunk [m]; by default the library's own.
+        robot: The robot; by default the one that is known by the library's name.
 
     Raises:
         SpeedOutOfRange: The library does not cover the speed.
@@ -62,7 +71,7 @@ def describe_gait(library: GaitLibrary, speed: float, apex: float | None = None)
         lines.append(f"  {phase.name}: {phase.duration:.3f} s on {feet}; Bezier order {order}")
         if phase.name in orders:
             lines.append(f"    {_why(orders[phase.name], order)}")
-    residual = library.residual(speed, apex)
+    residual = library.residual(speed, apex, robot=robot)
     lines.append(
         f"  in its Bezier form the equations of motion lack {residual.force:.2g} N, "
         f"{residual.moment:.2g} N m; feet {1e3 * residual.height:.2g} mm off the ground"

@@ -451,16 +451,17 @@ def load_library(
     """
     name = library_name(robot, gait, base)
     if not (resources.files(__package__) / "data" / f"{name}.npz").is_file():
+        named = robot if robot in ROBOTS else "FILE.toml"  # what that command takes
         options = "".join(
             f" --{option} {value}"
-            for option, value in (("robot", robot), ("gait", gait), ("base", base))
+            for option, value in (("robot", named), ("gait", gait), ("base", base))
             if value is not None
         )
         raise FileProblem(
             f"{name}.npz",
             "no such gait library is shipped",
             f"build one with 'pronk-pin gaits build{options}', and give its file to compare with "
-            "--gaits, or to gaits with --library",
+            "--gaits, to gaits with --library, or to view",
         )
     return _shipped(name)
 

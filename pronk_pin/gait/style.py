@@ -78,6 +78,31 @@ def load_style(name: str) -> Style:
     return STYLES[known_name("gait", name, STYLES)]
 
 
+_HIGHER = "more, and correct the apex of its RobotSpec, or the standing posture there"
+
+
+def check_robot(robot: Robot) -> None:
+    """Check that gaits can be made for a robot.
+
+    Raises:
+        InvalidInput: Its legs are not of three joints, in pairs; or it cannot stand as its
+            specification says.
+    """
+    mirror(as_robot(robot))
+    angles = robot.standing[-robot.nu :]
+    for k in np.flatnonzero((angles < robot.q_min) | (angles > robot.q_max)):
+        raise InvalidInput(
+            f"{robot.name} cannot stand with {robot.joint_names[k]} at {angles[k]:g} rad: its "
+            f"limits are {robot.q_min[k]:g} and {robot.q_max[k]:g} rad; correct the standing "
+            "posture of its RobotSpec, which is in radians"
+        )
+    if not robot.standing[2] > 0.0:
+        raise InvalidInput(
+            f"{robot.name} stands with its trunk at {robot.standing[2]:.3g} m, below its feet; "
+            "correct the standing posture of its RobotSpec"
+        )
+
+
 def gait_problem(
     robot: Robot, speed: float, *, gait: str = "pronk", base: Base | None = None, **changes: Any
 ) -> GaitProblem:
@@ -97,7 +122,7 @@ def gait_problem(
     """
     style = load_style(gait)
     base = style.base if base is None else known_base(base)
-    mirror(as_robot(robot))  # it has legs that gaits can be made for
+    check_robot(robot)
     apex = style.apex_of(robot)
     sequence = style.pitching if base == "sagittal" else style.sequence
     defaults: dict[str, Any] = {
@@ -114,7 +139,7 @@ def gait_problem(
     if not real("apex", options["apex"], Interval(0, 100, "m", above=True)) > stands:
         raise InvalidInput(
             f"apex {options['apex']:g} m: the {robot.name} stands at {stands:.3g} m already; give "
-            f"more, as {apex:g} m, or none for that"
+            + (f"more, as {apex:g} m, or none for that" if apex > stands else _HIGHER)
         )
     return GaitProblem(robot, speed, **options)
 

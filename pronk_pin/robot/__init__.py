@@ -28,6 +28,7 @@ from .robot_spec import JOINTS, ROBOTS, RobotSpec, load_robot_spec
 from .similarity import (
     MotorConstants,
     Size,
+    arrow_scale,
     feedback_gains,
     length_scale,
     motor_constants,
@@ -67,6 +68,7 @@ __all__ = [
     "Robot",
     "RobotSpec",
     "Size",
+    "arrow_scale",
     "as_array",
     "as_numbers",
     "as_one",

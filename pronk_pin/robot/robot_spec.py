@@ -28,7 +28,7 @@ _OF_A_LEG = {
     "velocity_limits": Interval(0, 1e5, "rad/s", above=True),
     "damping": Interval(0, 50, "N m s/rad"),
     "coulomb": Interval(0, 50, "N m"),
-    "kp": Interval(0, 1e5, "N m/rad"),
+    "kp": Interval(0, 1e5, "N m/rad", above=True),
     "kd": Interval(0, 1e4, "N m s/rad"),
 }
 """Fields with one value for each joint of a leg, and what the values can be."""
@@ -112,7 +112,10 @@ class RobotSpec:
                 raise InvalidInput(f"{name} is empty; give what stands in the URDF")
         object.__setattr__(self, "urdf", _own_file(self.urdf))
         for name in ("legs", "joints"):
-            object.__setattr__(self, name, sequence_of(name, getattr(self, name), text))
+            names = sequence_of(name, getattr(self, name), text)
+            if not names or len(set(names)) < len(names):
+                raise InvalidInput(f"{name} must name at least one, and none of them twice")
+            object.__setattr__(self, name, names)
         self._check_patterns()
         object.__setattr__(self, "standing", reals("standing", self.standing))
         if len(self.standing) not in (len(self.joints), len(self.joint_names)):

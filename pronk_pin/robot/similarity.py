@@ -101,6 +101,11 @@ def length_scale(robot: Robot) -> float:
     return float(robot.standing[2] / reference.standing[2])
 
 
+def arrow_scale(robot: Robot) -> float:
+    """Lengths of drawn forces [m/N] over those of the A1: by the robot's size, and its weight."""
+    return length_scale(robot) * load_robot("a1").mass / robot.mass
+
+
 def torque_scale(robot: Robot) -> float:
     """Torques of a robot's joints over the A1's, as its gains are over those: the calf's."""
     return feedback_gains(robot)[0][-1] / feedback_gains(load_robot("a1"))[0][-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -240,6 +241,31 @@ def test_written_models_are_read_as_the_same_robot(identified: Robot, tmp_path: 
         atol=1e-9,
     )
     np.testing.assert_allclose(read.damping[6:], identified.of_joint("damping"))
+
+
+def test_a_lighter_trunk_whose_mass_hangs_on_another_link_is_written_as_a_urdf_that_can_be_read(
+    tmp_path: Path,
+) -> None:
+    """ANYmal B's base is a frame without inertia, and base_inertia is fixed to it."""
+    names = RobotSpec(
+        "anymal_b",
+        "anymal_b_simple_description/robots/anymal.urdf",
+        base_link="base",
+        legs=("LF", "LH", "RF", "RH"),
+        joints=("HAA", "HFE", "KFE"),
+        joint_pattern="{leg}_{joint}",
+        foot_pattern="{leg}_FOOT",
+        standing=(0.0, 0.9, -1.8),
+    )
+    lighter = load_robot(names).with_parameters(ModelParameters(payload=-0.5))
+    urdf = write_urdf(lighter, tmp_path / "lighter.urdf")
+    read = load_robot(replace(names, urdf=str(urdf)))
+    assert read.mass == pytest.approx(load_robot(names).mass - 0.5)
+    np.testing.assert_allclose(
+        read.model.inertias[1].toDynamicParameters(),
+        lighter.model.inertias[1].toDynamicParameters(),
+        atol=1e-9,
+    )
 
 
 @pytest.mark.parametrize(

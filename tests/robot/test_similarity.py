@@ -85,6 +85,9 @@ def test_what_a_specification_gives_is_taken(tmp_path: Path) -> None:
         ({"kp": (35.0, 60.0)}, "kp has 2 values; give 3, one for each joint of a leg, or none"),
         ({"kd": (1.0, -6.0, 2.0)}, r"kd\[1\]=-6.0"),
         ({"apex": 0.0}, r"apex=0\.0"),
+        ({"kp": (0.0, 60.0, 90.0)}, r"kp\[0\]=0\.0"),
+        ({"legs": ()}, "legs must name at least one, and none of them twice"),
+        ({"legs": ("FL", "FL")}, "legs must name at least one, and none of them twice"),
         ({"torque_limits": (0.0, 1.0, 1.0)}, r"torque_limits\[0\]=0\.0"),
     ],
 )
@@ -98,3 +101,22 @@ def test_wrong_numbers_are_refused_with_what_is_wanted(
 def test_an_apex_at_which_the_robot_stands_is_refused_with_one_that_will_do() -> None:
     with pytest.raises(InvalidInput, match=r"the b1 stands at 0\.475 m already; give more, as 0.6"):
         gait_problem(load_robot("b1"), 0.0, apex=0.34)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"standing": (0.0, 52.0, -103.0)},  # degrees
+            "a1 cannot stand with FL_thigh_joint at 52 rad: its limits are -1.0472 and 4.18879 rad",
+        ),
+        ({"standing": (0.0, 3.5, -1.0)}, "stands with its trunk at -0.328 m, below its feet"),
+        ({"apex": 0.2}, "a1 stands at 0.269 m already; give more, and correct the apex of its"),
+    ],
+)
+def test_a_specification_that_nothing_can_stand_by_is_refused_before_the_solver(
+    changes: dict[str, object], message: str
+) -> None:
+    robot = load_robot(replace(ROBOTS["a1"], **changes))  # type: ignore[arg-type]
+    with pytest.raises(InvalidInput, match=message):
+        gait_problem(robot, 0.0)

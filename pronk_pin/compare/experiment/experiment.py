@@ -16,7 +16,15 @@ from tyro.conf import Suppress
 
 from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
 from ..._display import Displayed, listed, spanned
-from ...control import CONTROLLERS, PARTS, ControllerSpec, load_controller
+from ...control import (
+    CONTROLLERS,
+    PARTS,
+    ComputedTorque,
+    ControllerSpec,
+    ExtendedStateObserver,
+    level_robot,
+    load_controller,
+)
 from ...errors import InvalidInput
 from ...gait import STYLES, Gait, GaitLibrary, load_library
 from ...robot import (
@@ -216,6 +224,8 @@ class Experiment(Displayed):
         for spec in map(load_controller, self.controllers):
             if spec.gait_model == "datasheet":
                 _ = with_rotors(self.model)  # the datasheet is there
+            if isinstance(spec.tick_controller, ComputedTorque | ExtendedStateObserver):
+                _ = level_robot(spec.name, self.model, self.base)
             if spec.source == "identified" and self.base != "locked":
                 raise InvalidInput(
                     f"controller '{spec.name}' identifies the robot on the locked base; leave it "

@@ -27,7 +27,7 @@ from .metrics import (
     summarize_cell,
 )
 from .own_metrics import METRICS, Metric, load_metric
-from .paper_table import table_1
+from .paper_table import of_papers_robot, table_1
 from .statistics import (
     CONFIDENCE,
     LEAST_UNITS,
@@ -77,6 +77,7 @@ __all__ = [
     "load_metric",
     "mean_interval",
     "of_first_leg",
+    "of_papers_robot",
     "peak_history",
     "reduction",
     "robots",

@@ -8,6 +8,14 @@ import pandas as pd
 
 from ...storage import REINSTALL, read_csv, reading
 
+PAPERS_ROBOT = "a1"
+"""Robot of the paper: nothing of another one stands beside its table."""
+
+
+def of_papers_robot(summary: pd.DataFrame) -> bool:
+    """Whether a summary is of the paper's robot."""
+    return bool((summary["robot"] == PAPERS_ROBOT).all())
+
 
 def table_1() -> pd.DataFrame:
     """Peak errors [rad] as printed: columns `speed`, `joint`, `controller`, `value`."""

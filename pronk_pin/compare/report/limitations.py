@@ -10,7 +10,16 @@ import numpy as np
 import pandas as pd
 
 from ...control import SKIPPED
-from ..metrics import CONFIDENCE, LEAST_UNITS, family, robots, sampled, table_1, unit_of
+from ..metrics import (
+    CONFIDENCE,
+    LEAST_UNITS,
+    family,
+    of_papers_robot,
+    robots,
+    sampled,
+    table_1,
+    unit_of,
+)
 from ..results import Results
 from ..world import Sensors
 from .tables import SHOWN
@@ -141,7 +150,7 @@ def _of_the_metrics(summary: pd.DataFrame) -> Iterator[str]:
             "Errors count from the true contact on, which no controller knows. Counted from when "
             f"it is felt, as a controller sees it, the mean peaks are: {numbers}."
         )
-    if "pd" in shown:
+    if "pd" in shown and of_papers_robot(summary):
         printed = table_1()
         printed = printed[(printed["controller"] == "pd") & (printed["joint"] == "thigh")]
         ratio = mean("peak_error", "pd", "thigh") / float(printed["value"].mean())

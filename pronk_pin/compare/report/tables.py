@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ...robot import JOINTS
-from ..metrics import in_family, robots, table_1
+from ..metrics import in_family, of_papers_robot, robots, table_1
 from ..world import Scenario, shipped_scenario
 
 SHOWN = ("calf", "thigh")
@@ -92,7 +92,7 @@ def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     Returns:
         Rows by speed, and one of means over the speeds that have all of ours; columns by joint,
         source ("ours", "paper") and quantity ("PD", "ILC", "reduction"). Empty where nobody stayed
-        up.
+        up, and of another robot than the paper's.
     """
     printed, there, parts = table_1(), set(summary["controller"]), {}
     own = {"pd": "pd", "ilc": paper_learner(there)}
@@ -105,6 +105,7 @@ def beside_the_paper(summary: pd.DataFrame, *, scenario: str) -> pd.DataFrame:
     table = pd.DataFrame(parts)
     measured = [name for name in table.columns if name[1] == "ours"]
     table = table.dropna(subset=measured, how="all") if measured else table.iloc[:0]
+    table = table if of_papers_robot(summary) else table.iloc[:0]
     if len(table):
         table.loc["mean"] = table.dropna(subset=measured).mean()
     for joint in SHOWN:

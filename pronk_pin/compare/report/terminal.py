@@ -8,7 +8,7 @@ import textwrap
 import numpy as np
 import pandas as pd
 
-from ..metrics import in_family
+from ..metrics import in_family, of_papers_robot
 from .cells import against_model, beat_text, between, number, units_of_intervals
 from .overview import MOVING, Overview, answer
 from .tables import SHOWN, beside_the_paper, paper_learner
@@ -25,7 +25,8 @@ def format_summary(summary: pd.DataFrame) -> str:
 
 
 def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
-    """Table I beside the paper's, the overview and the verdict, as text for a terminal."""
+    """Table I beside the paper's, of its robot; the overview and the verdict, as text for a
+    terminal."""
     tables = answer(in_family(summary, scenario))
     single = bool((summary["scenario"] == scenario).any())
     mine = tables[scenario]
@@ -33,7 +34,7 @@ def format_tables(summary: pd.DataFrame, *, scenario: str) -> str:
         _format_beside(beside_the_paper(summary, scenario=scenario), paper_learner(mine))
         if single
         else "",
-        beside_note(mine) if single else "",
+        beside_note(mine) if single and of_papers_robot(summary) else "",
         format_overview(mine),
         textwrap.fill(answer_in_words(in_family(summary, scenario), tables=tables), _WIDTH),
     ]

@@ -6,6 +6,7 @@ Goes out: motor torques, or `SetPoints` for the motor drivers.
 
 from .computed_torque import ComputedTorque
 from .extended_state_observer import ExtendedStateObserver
+from .level_robot import level_robot
 from .tick_controller import (
     BindableTickController,
     ControlTime,
@@ -28,4 +29,5 @@ __all__ = [
     "TickLoop",
     "WholeBodyQP",
     "known_tick_controller",
+    "level_robot",
 ]

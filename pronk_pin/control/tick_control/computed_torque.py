@@ -27,9 +27,9 @@ import numpy as np
 from ..._checks import Interval, keep_reals
 from ..._typing import Array, BoolArray
 from ...gait import Gait
-from ...robot import Robot, with_rotors
+from ...robot import Robot
 from ..signals import ControlContext
-from .level_robot import TRUNK, LevelRobot, cheapest_forces, check_level
+from .level_robot import TRUNK, LevelRobot, cheapest_forces, level_robot
 from .tick_controller import Observation, TickController
 
 _CHECKS = {
@@ -75,8 +75,8 @@ class ComputedTorqueControl(TickController):
     """
 
     def __init__(self, settings: ComputedTorque, context: ControlContext) -> None:
-        check_level(context)
-        self.model = LevelRobot(with_rotors(context.robot))
+        robot = level_robot(context.controller, context.robot, context.base)
+        self.model = LevelRobot(robot)
         self._omega, self._least_load = settings.omega, settings.least_load
         self._trunk = np.stack(
             [_trunk_acceleration(gait, context) for gait in context.gaits]

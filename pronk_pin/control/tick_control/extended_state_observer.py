@@ -38,9 +38,9 @@ import numpy as np
 from ..._checks import Interval, keep_reals
 from ..._typing import Array, IntArray
 from ...gait import Gait
-from ...robot import Robot, with_rotors
+from ...robot import Robot
 from ..signals import PARTS, ControlContext, clip_torque
-from .level_robot import TRUNK, LevelRobot, check_level
+from .level_robot import TRUNK, LevelRobot, level_robot
 from .tick_controller import Observation, TickController
 
 _NODES = 33
@@ -89,8 +89,7 @@ class ExtendedStateObserverControl(TickController):
     """
 
     def __init__(self, settings: ExtendedStateObserver, context: ControlContext) -> None:
-        check_level(context)
-        robot = with_rotors(context.robot)
+        robot = level_robot(context.controller, context.robot, context.base)
         self._gains, self._tau_max, self._dt = context.gains, robot.tau_max, context.timestep
         pole = np.exp(-settings.bandwidth * context.timestep)
         self._corrections = 1.0 - pole**2, (1.0 - pole) ** 2 / context.timestep

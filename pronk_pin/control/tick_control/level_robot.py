@@ -15,8 +15,7 @@ import pinocchio as pin
 from ..._typing import Array, BoolArray
 from ...errors import InvalidInput
 from ...kinematics import contact_points, leg_geometry
-from ...robot import NB, Robot
-from ..signals import ControlContext
+from ...robot import NB, Robot, with_rotors
 
 TRUNK = 2
 """Coordinates of a locked trunk: x and z."""
@@ -28,17 +27,18 @@ _FORCE_WEIGHT = 1e-6
 """Cost of contact forces against joint torques [m^2], as in `inverse_dynamics`."""
 
 
-def check_level(context: ControlContext) -> None:
-    """Refuse robots whose trunks may turn.
+def level_robot(controller: str, robot: Robot, base: str) -> Robot:
+    """The robot with its rotors, if its trunk is level.
 
     Raises:
-        InvalidInput: The base is not locked.
+        InvalidInput: The base is not locked, or the rotors are not known.
     """
-    if context.base != "locked":
+    if base != "locked":
         raise InvalidInput(
-            f"controller '{context.controller}' reckons with trunks that are locked to x and z; "
-            f"base='{context.base}' needs another one, such as 'pd' or 'ilc'"
+            f"controller '{controller}' reckons with trunks that are locked to x and z; "
+            f"base='{base}' needs another one, such as 'pd' or 'ilc'"
         )
+    return with_rotors(robot)
 
 
 class LevelRobot:

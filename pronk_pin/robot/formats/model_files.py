@@ -76,8 +76,8 @@ def write_urdf(robot: Robot, path: Path | str, notes: Sequence[str] = ()) -> Pat
     root = ElementTree.fromstring(robot.urdf)
     bare = robot.bare or robot
     added = _parameters(robot.model.inertias[1]) - _parameters(bare.model.inertias[1])
-    frame = robot.model.frames[frame_id(robot.model, robot.spec.base_link)].placement
-    link = next(e for e in root.findall("link") if e.get("name") == robot.spec.base_link)
+    link = _trunk_link(robot, root)
+    frame = robot.model.frames[frame_id(robot.model, link.get("name", ""))].placement
     own = link_inertia(link)
     in_trunk = np.zeros(10) if own is None else _parameters(frame.act(own))
     if np.any(added):
@@ -94,6 +94,24 @@ def write_urdf(robot: Robot, path: Path | str, notes: Sequence[str] = ()) -> Pat
             dynamics.set(attribute, f"{values[key][k]:.6g}")
     ElementTree.indent(root)
     return _write(path, ElementTree.tostring(root, encoding="unicode"), notes)
+
+
+def _trunk_link(robot: Robot, root: ElementTree.Element) -> ElementTree.Element:
+    """The link that carries the load: the heaviest of the trunk, which may be a frame without
+    mass, and what is fixed to it."""
+    model, base = robot.model, robot.spec.base_link
+    mover = model.frames[frame_id(model, base)].parentJoint
+
+    def order(link: ElementTree.Element) -> tuple[float, bool]:
+        own = link_inertia(link)
+        return 0.0 if own is None else float(own.mass), link.get("name") == base
+
+    fixed = [
+        link
+        for link in root.findall("link")
+        if model.frames[frame_id(model, link.get("name", ""))].parentJoint == mover
+    ]
+    return max(fixed, key=order)
 
 
 def _parameters(inertia: pin.Inertia) -> np.ndarray:

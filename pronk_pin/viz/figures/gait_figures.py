@@ -16,7 +16,7 @@ from matplotlib.gridspec import GridSpec
 from ..._typing import Array
 from ...gait import Gait, GaitLibrary, Motion
 from ...kinematics import foot_positions, mirror
-from ...robot import JOINTS, NB, Robot, length_scale, load_robot
+from ...robot import JOINTS, NB, Robot, arrow_scale, length_scale, load_robot
 from ..figure_style import ACCENT, SEQUENTIAL, known_format, new_figure, save_figure, styled
 
 _SAMPLES = 81
@@ -251,11 +251,6 @@ def _at(gait: Gait, robot: Robot, time: float) -> tuple[Motion, str]:
     return phase.motion(robot, s), phase.name
 
 
-def _scale(robot: Robot) -> float:
-    """Length of the forces' arrows beside those of the A1: by the robot's size, and its weight."""
-    return length_scale(robot) * load_robot("a1").mass / robot.mass
-
-
 def _pose(axes: Axes, robot: Robot, motion: Motion, shift: float, color: Array) -> None:
     """Trunk and left legs of one pose, and the forces on its feet."""
     q = motion.q[0]
@@ -271,7 +266,7 @@ def _pose(axes: Axes, robot: Robot, motion: Motion, shift: float, color: Array) 
         line = np.array(points)
         axes.plot(line[:, 0] + shift, line[:, 2], color=color, lw=2.2, solid_capstyle="round")
         axes.plot(feet[leg, 0] + shift, feet[leg, 2], "o", color=color, ms=3.5)
-        force = _ARROW * _scale(robot) * motion.lam[0, leg]
+        force = _ARROW * arrow_scale(robot) * motion.lam[0, leg]
         if np.linalg.norm(force) > 1e-3:
             axes.annotate(
                 "",

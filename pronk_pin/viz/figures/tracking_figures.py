@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..._typing import Array, IntArray
 from ...compare import steady
-from ...compare.metrics import of_first_leg, robots, table_1
+from ...compare.metrics import of_first_leg, of_papers_robot, robots, table_1
 from ...compare.report import SHOWN
 from ..figure_style import (
     ACCENT,
@@ -177,16 +177,17 @@ def _by_speed(torque: xr.DataArray, phase: Array, label: str) -> Figure:
 
 @styled
 def errors_by_speed(summary: pd.DataFrame, *, scenario: str) -> Figure:
-    """Peak stance error over the speed, for every controller, with the paper's Table I.
+    """Peak stance error over the speed, for every controller, beside the Table I of the paper.
 
-    Means over the robots that stayed up.
+    Means over the robots that stayed up. The table is there if this is its robot.
     """
     shown = in_order(summary[summary["scenario"] == scenario]["controller"].unique())
     figure = new_figure(TWO_COLUMNS, 2.9)
     panels = figure.subplots(1, 2)
     for axes, joint in zip(panels, SHOWN, strict=True):
         printed = table_1()
-        for controller, marker in (("pd", "x"), ("ilc", "+")):
+        beside = (("pd", "x"), ("ilc", "+")) if of_papers_robot(summary) else ()
+        for controller, marker in beside:
             paper = printed[(printed["joint"] == joint) & (printed["controller"] == controller)]
             label = f"paper, {LABELS[controller]}"
             axes.plot(

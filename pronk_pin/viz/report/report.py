@@ -23,6 +23,7 @@ from ...compare.metrics import (
     VARIABLES,
     PeakHistory,
     family,
+    of_papers_robot,
     peak_history,
     sampled,
 )
@@ -53,7 +54,7 @@ FIGURES = "figures"
 """Folder of the figures of report.md."""
 
 _CAPTIONS = {
-    "errors": "Peak stance error by speed, beside the paper's Table I.",
+    "errors": "Peak stance error by speed; of the paper's robot beside its Table I.",
     "learning": "Peak stance error while learning; dotted: controllers that do not learn.",
     "tracking": "Calf and thigh of the front left leg before and after the learning is switched on "
     "(the paper's Fig. 3).",
@@ -255,7 +256,8 @@ def _world(
     found = scenario_figures(results, scenario)
     document.picture("errors", found["errors"], _CAPTIONS["errors"])
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
-    if {"pd", LEARNER} <= set(results.experiment.controller_names):
+    learns = {"pd", LEARNER} <= set(results.experiment.controller_names)
+    if learns and of_papers_robot(summary):
         document.heading("Table I, beside the paper's", f"{scenario}-table", level=3)
         _beside(document, beside_the_paper(summary, scenario=scenario), table)
     if LEARNER in results.experiment.controller_names:

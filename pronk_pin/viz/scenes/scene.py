@@ -19,7 +19,7 @@ import numpy as np
 from ..._checks import Interval, instance_of, none_or, real, sequence_of, shown, text
 from ..._typing import Array
 from ...errors import InvalidInput
-from ...robot import Robot, as_numbers, as_robot
+from ...robot import Robot, arrow_scale, as_numbers, as_robot
 from .meshes import Appearance, appearance
 
 Color = tuple[float, float, float]
@@ -152,6 +152,10 @@ class Track:
         return values_at
 
 
+_FORCE_SCALE = 0.0025
+"""Length of a force arrow of the A1 [m/N]."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Robots, their motions and the ground.
@@ -162,7 +166,8 @@ class Scene:
         title: Heading of the page.
         caption: A line below the heading.
         friction: Friction coefficient of the ground, for the cones; None without cones.
-        force_scale: Length of a force arrow [m/N].
+        force_scale: Length of a force arrow [m/N]; by default 0.1 m for 40 N of the A1, and of
+            others by their size and weight.
         force_window: Time over which the forces are means [s], for the legend; 0 if they are not.
     """
 
@@ -171,7 +176,7 @@ class Scene:
     title: str = ""
     caption: str = ""
     friction: float | None = None
-    force_scale: float = 0.0025
+    force_scale: float | None = None
     force_window: float = 0.0
 
     def __post_init__(self) -> None:
@@ -187,6 +192,8 @@ class Scene:
         for track in self.tracks:
             track.check(self.robot)
         none_or(real, "friction", self.friction, Interval(0, 10, above=True, below=True))
+        if self.force_scale is None:
+            object.__setattr__(self, "force_scale", _FORCE_SCALE * arrow_scale(self.robot))
 
     @cached_property
     def appearance(self) -> Appearance:

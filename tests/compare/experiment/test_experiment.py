@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from pathlib import Path
 from typing import Any
 
@@ -195,3 +196,19 @@ def test_the_steps_of_a_cell_are_those_it_reports(tmp_path: Path) -> None:
     reported: list[int] = []
     run_cell(dataclasses.replace(cell), progress=reported.append)
     assert sum(reported) == cell.steps == 1500
+
+
+@pytest.mark.parametrize("name", ["computed-torque", "whole-body-qp", "model+eso", "model+rotors"])
+def test_what_needs_rotors_that_are_not_known_is_refused_before_anything_is_simulated(
+    name: str,
+) -> None:
+    with pytest.raises(InvalidInput, match="the rotors of bolt are not known"):
+        Experiment(robot="bolt", controllers=("pd", name))
+
+
+@pytest.mark.parametrize("name", ["computed-torque", "whole-body-qp", "model+eso"])
+def test_what_needs_a_level_trunk_is_refused_before_anything_is_simulated(name: str) -> None:
+    with pytest.raises(
+        InvalidInput, match=f"'{re.escape(name)}' reckons with trunks that are lock"
+    ):
+        Experiment(speeds=(0.0,), base="free", controllers=("pd", name))

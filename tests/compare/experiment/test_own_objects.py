@@ -407,6 +407,13 @@ def test_gaits_and_robots_of_ones_own(
     ]
     assert cli.main(words) == 0
     assert "robot twin" in capsys.readouterr().out
+    own = ("--robot", str(tmp_path / "robot.toml"))
+    library, figures = ("--library", str(path)), ("--folder", str(tmp_path / "figures"))
+    assert cli.main(["gaits", "show", "0.3", *library, *own]) == 0
+    assert cli.main(["gaits", "plot", *library, *own, *figures, "--format", "svg"]) == 0
+    assert cli.main(["view", str(path), *own, "--html", str(tmp_path / "gaits.html")]) == 0
+    assert cli.main(["gaits", "show", "0.3", *library]) == 1
+    assert "known by name; give its file, --robot FILE.toml" in capsys.readouterr().err
     path.unlink()
     (tmp_path / "robot.toml").unlink()  # the folder has all it needs
     results = Results.load(tmp_path / "result")

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from pronk_pin.compare import random_scenarios
+from pronk_pin.compare.report import format_tables
 from pronk_pin.compare.report.overview import answer, overview
 from pronk_pin.compare.report.tables import (
     beside_the_paper,
@@ -20,6 +21,15 @@ def test_our_errors_stand_beside_the_papers_at_the_same_speed(summary: pd.DataFr
     assert table.loc[0.3, ("calf", "paper", "PD")] == 0.089
     assert np.isnan(table.loc[0.35, ("calf", "paper", "PD")])
     assert table.loc["mean", ("thigh", "ours")].tolist() == pytest.approx([0.075, 0.015, 0.8])
+
+
+def test_nothing_of_another_robot_stands_beside_the_papers(summary: pd.DataFrame) -> None:
+    assert "paper, Table I" in format_tables(summary, scenario="nominal")
+    hyq = summary.assign(robot="hyq")
+    assert beside_the_paper(hyq, scenario="nominal").empty
+    text = format_tables(hyq, scenario="nominal")
+    assert "peak error [rad]" in text
+    assert "paper" not in text
 
 
 def test_the_overview_has_means_reductions_and_the_slowest_speed(summary: pd.DataFrame) -> None:

@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 from pronk_pin.errors import FileProblem, InvalidInput, PartNotShown
 from pronk_pin.gait import Gait, GaitPhase
 from pronk_pin.kinematics import foot_positions
-from pronk_pin.robot import Robot, RobotSpec, find_mesh, load_robot
+from pronk_pin.robot import Robot, RobotSpec, find_mesh, length_scale, load_robot
 from pronk_pin.viz import Scene, Track, gait_scene
+from pronk_pin.viz.player.scene_encoding import _size
 from pronk_pin.viz.scenes.mesh_files import Mesh, load_mesh, thin
 from pronk_pin.viz.scenes.meshes import Appearance, Solid, appearance
 
@@ -351,3 +352,18 @@ def test_a_part_that_a_scene_has_twice_is_there_twice(tmp_path: Path) -> None:
     corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     wanted = [corner + np.array([x, 0, z]) for x in (0.0, 10.0) for z in (0.0, 1.0)]
     assert triangles == {tuple(map(tuple, each.tolist())) for each in wanted}
+
+
+def test_forces_and_the_camera_go_with_the_robots_size_and_weight() -> None:
+    """The same share of the weight is as long an arrow, over the height at which a robot stands."""
+    shown = {}
+    for name in ("a1", "bolt", "hyq"):
+        robot = load_robot(name)
+        still = Track("still", np.array([0.0, 1.0]), np.tile(robot.standing, (2, 1)))
+        scene = Scene(robot, [still])
+        length = scene.force_scale * robot.mass / length_scale(robot)
+        shown[name] = (length, _size(robot))
+    lengths = [length for length, _ in shown.values()]
+    assert lengths == pytest.approx([0.0025 * load_robot("a1").mass] * 3)
+    assert shown["a1"][1] == shown["bolt"][1] == 1.0
+    assert shown["hyq"][1] == pytest.approx(0.747 / 0.4, rel=1e-3)  # it is longer than it is high

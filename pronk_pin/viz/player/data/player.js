@@ -506,7 +506,7 @@ class Player {
                        ghosts.length === 1 && ghosts[0].caption ? `: ${ghosts[0].caption}` : ""));
     }
     if (this.film.tracks.some((track) => track.channels.includes("forces"))) {
-      const newtons = Math.round(0.1 / this.film.forceScale);
+      const newtons = Number((0.1 / this.film.forceScale).toPrecision(2));
       const mean = this.film.forceWindow
         ? `, mean over ${Math.round(1000 * this.film.forceWindow)} ms` : "";
       items.push(entry("#d55e00", "", `ground reaction force, 0.1 m for ${newtons} N${mean}`));
