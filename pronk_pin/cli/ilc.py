@@ -4,32 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, subcommand
 
-from .._checks import whole
-from ..compare import Results, load_scenario
-from ..compare.studies import (
-    COUPLINGS,
-    STRIDES,
-    compare_prediction,
-    describe_gains,
-    describe_prediction,
-    describe_seeding,
-    describe_stability,
-    describe_transfers,
-    measure_seeding,
-    measure_stability,
-    measure_transfers,
-    simulate_learning,
-    stored_learning,
-    sweep_gains,
-)
-from ..control import load_controller
-from ..gait import Gait
-from ..viz import known_figure, save_figure
-from ..viz.figures import errors_by_seed, gains_figure, predicted_and_measured, transfers_figure
+if TYPE_CHECKING:
+    from ..gait import Gait
 
 
 @dataclass(frozen=True)
@@ -58,6 +38,19 @@ class Analyze:
 
     def run(self) -> None:
         """Do it."""
+        from .._checks import whole
+        from ..compare import Results, load_scenario
+        from ..compare.studies import (
+            STRIDES,
+            compare_prediction,
+            describe_prediction,
+            simulate_learning,
+            stored_learning,
+        )
+        from ..control import load_controller
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import predicted_and_measured
+
         whole("strides", self.strides, STRIDES)
         known_figure(self.figure)
         gaits: list[Gait] | None = None  # those that are shipped
@@ -97,13 +90,17 @@ class Stability:
     """Speeds [m/s]."""
     scenario: str = "payload+delay"
     """Scenario of the learning."""
-    couplings: tuple[float, ...] = COUPLINGS
+    couplings: tuple[float, ...] = (1.0, 0.8, 0.6, 0.5, 0.0)
     """Shares of the stance's errors that the flight's law is shown."""
     robot: str = "a1"
     """Robot."""
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_stability, measure_stability
+        from ..control import load_controller
+
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         table = measure_stability(
             spec, self.speed, scenario, couplings=self.couplings, robot=self.robot
@@ -131,6 +128,12 @@ class Gains:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_gains, sweep_gains
+        from ..control import load_controller
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import gains_figure
+
         known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         table = sweep_gains(spec, self.speed, scenario, robot=self.robot)
@@ -161,6 +164,12 @@ class Transfer:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_transfers, measure_transfers
+        from ..control import load_controller
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import transfers_figure
+
         known_figure(self.figure)
         table = measure_transfers(
             load_controller(self.controller),
@@ -191,6 +200,11 @@ class Seeding:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_seeding, measure_seeding
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import errors_by_seed
+
         known_figure(self.figure)
         table = measure_seeding(self.speed, load_scenario(self.scenario), robot=self.robot)
         print(describe_seeding(table))

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from tyro.conf import Positional
 
-from .._registry import announced_names
-from ..compare import KNOWN
-from ..compare.experiment import SUITES, load_suite
-from ..compare.metrics import METRICS
-from ..compare.world import BASE_SCENARIOS
-from ..control import CONTROLLERS, ControllerSpec, load_controller
-from ..gait import shipped_libraries
-from ..robot import ROBOTS, load_robot_spec
+if TYPE_CHECKING:
+    from ..control import ControllerSpec
 
 Kind: TypeAlias = Literal["controllers", "robots", "gaits", "scenarios", "metrics", "suites"]
 
@@ -36,6 +30,9 @@ class List:
 
 
 def _controllers() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..control import CONTROLLERS, load_controller
+
     for name in (*CONTROLLERS, *announced_names("controller")):
         yield name, _what_it_does(load_controller(name))
 
@@ -54,11 +51,16 @@ def _what_it_does(spec: ControllerSpec) -> str:
 
 
 def _robots() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..robot import ROBOTS, load_robot_spec
+
     for name in (*ROBOTS, *announced_names("robot")):
         yield name, load_robot_spec(name).urdf
 
 
 def _gaits() -> Iterator[tuple[str, str]]:
+    from ..gait import shipped_libraries
+
     for library in sorted(shipped_libraries(), key=lambda one: (one.robot, one.base)):
         speeds, apexes = library.speeds, library.apexes
         gait = library.metadata.get("gait", "pronk")
@@ -69,6 +71,10 @@ def _gaits() -> Iterator[tuple[str, str]]:
 
 
 def _scenarios() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..compare import KNOWN
+    from ..compare.world import BASE_SCENARIOS
+
     for name in BASE_SCENARIOS:
         yield name, "a world to begin with"
     for name, mismatch in KNOWN.items():
@@ -79,6 +85,9 @@ def _scenarios() -> Iterator[tuple[str, str]]:
 
 
 def _metrics() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..compare.metrics import METRICS
+
     for name, (unit, text) in METRICS.items():
         yield f"{name} [{unit}]", text
     for name in announced_names("metric"):
@@ -86,6 +95,8 @@ def _metrics() -> Iterator[tuple[str, str]]:
 
 
 def _suites() -> Iterator[tuple[str, str]]:
+    from ..compare.experiment import SUITES, load_suite
+
     for name in SUITES:
         suite = load_suite(name)
         yield (
