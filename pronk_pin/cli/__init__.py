@@ -10,6 +10,7 @@ import contextlib
 import functools
 import io
 import operator
+import os
 import signal
 import sys
 import textwrap
@@ -25,7 +26,7 @@ from tyro.conf import FlagCreatePairsOff, OmitSubcommandPrefixes, arg, subcomman
 
 from .. import __version__
 from .._workers import handling
-from ..errors import LeakyFilter, OtherMachine, PartNotShown, PronkError
+from ..errors import LeakyFilter, OtherMachine, PartNotShown, PronkError, UnknownName
 from .comparison import Compare, Explain, Report, Reproduce
 from .gaits import Gaits
 from .ilc import Ilc
@@ -63,12 +64,16 @@ COMMANDS: Mapping[str, type[_Runs]] = {
 
 _PURPOSE = "When a legged robot repeats a motion, does practice beat the model?"
 _HELP = ("-h", "--help")
+SHELLS = ("bash", "zsh", "fish")
+"""Shells that can complete commands and options."""
+
 _COMPLETION = ("--tyro-print-completion", "--tyro-write-completion")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; the exit code is 0, 1 for an error of ours or models that differ, 2 for wrong
-    usage, 130 on Ctrl-C, and 143 or 129 where the program is asked to end by SIGTERM or SIGHUP."""
+    usage, 130 on Ctrl-C, 141 where nobody reads the output any more, and 143 or 129 where the
+    program is asked to end by SIGTERM or SIGHUP: docs/commands.md."""
     with _orderly_end() as asked:
         try:
             return _run(arguments)
@@ -76,6 +81,11 @@ def main(arguments: list[str] | None = None) -> int:
             if not asked:
                 print(f"pronk-pin: {' '.join(str(error).splitlines())}", file=sys.stderr)
                 return 1
+        except BrokenPipeError:
+            if not asked:
+                if not _unread():
+                    raise
+                return 128 + signal.SIGPIPE
         except KeyboardInterrupt:
             if not asked:
                 print("pronk-pin: interrupted", file=sys.stderr)
@@ -93,12 +103,28 @@ def _run(arguments: list[str] | None) -> int:
     if arguments[:1] == ["--version"]:
         print(f"pronk-pin {__version__}")
         return 0
+    if arguments and arguments[0] in _COMPLETION:
+        shell = "".join(arguments[1:2])
+        if shell not in SHELLS:
+            raise UnknownName("shell", shell, SHELLS)
     command = _parsed(arguments)
     with warnings.catch_warnings():
         for category in (LeakyFilter, OtherMachine, PartNotShown):
             warnings.simplefilter("once", category)
         warnings.showwarning = _show_warning
-        return command.run() or 0
+        code = command.run() or 0
+    sys.stdout.flush()  # while it is known what to do where nobody reads on
+    return code
+
+
+def _unread() -> bool:
+    """Whether nobody reads the output any more, as after `| head`; what is left of it goes."""
+    try:
+        print(flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
 
 
 @contextmanager

@@ -193,9 +193,9 @@ class Report:
     result: Positional[Path]
     """Results folder."""
     other: Positional[Path | None] = None
-    """Results folder to compare it with."""
+    """Results folder to compare it with; by default none."""
     figures: Path | None = None
-    """Write the figures into this folder too, as SVG."""
+    """Write the figures into this folder too, as SVG and PDF; by default into the report alone."""
 
     def run(self) -> None:
         """Do it."""
@@ -229,13 +229,14 @@ class Explain:
     scenario: str | None = None
     """Scenario of its strides; by default the first."""
     figure: Path | None = None
-    """Draw the learned torque by cause into this file: png, svg or pdf."""
+    """Draw the learned torque by cause into this file: png, svg or pdf; by default it is not
+    drawn."""
     speed: float | None = None
     """Speed that the figure shows [m/s]; by default the one nearest to 0.5."""
     write_urdf: Path | None = None
-    """Write the identified model to this URDF."""
+    """Write the identified model to this URDF; by default it is not written."""
     write_mjcf: Path | None = None
-    """Write the identified model to this MJCF."""
+    """Write the identified model to this MJCF; by default it is not written."""
     close_loop: bool = False
     """Try the identified model, with its gaits optimised again, beside the model, the torque
     library and learning, at speeds halfway between those of the result and with 3 kg more."""

@@ -20,7 +20,7 @@ class Parity:
     model: Positional[Path | None] = None
     """MJCF or URDF to compare with; by default MuJoCo's reading of our URDF."""
     robot: str = "a1"
-    """Robot it should be: a name of 'pronk-pin list robots', or a TOML file."""
+    """Robot it should be: a name of `pronk-pin list robots`, a TOML file, or an address."""
     states: int = 200
     """Number of random states."""
     seed: int = 0

@@ -54,7 +54,8 @@ class View:
     scenario: str | None = None
     """Scenario of a result; by default the first."""
     beside: str | None = None
-    """Robot to show beside it: another controller of the result, or 'before learning'."""
+    """Robot to show beside it: another controller of the result, or 'before learning'; by
+    default none."""
     stride: int | None = None
     """Show the dozen strides of a result with this one; by default those around the start of
     learning."""
@@ -73,13 +74,13 @@ class View:
     duration: float | None = None
     """End the page after so many seconds; by default on Ctrl-C."""
     html: Path | None = None
-    """Write the page to this file instead: it opens offline."""
+    """Write the page to this file instead, which opens offline; by default it is served."""
     png: Path | None = None
-    """Write a picture to this file instead."""
+    """Write a picture to this file instead; by default none."""
     gif: Path | None = None
-    """Write an animation to this file instead."""
+    """Write an animation to this file instead; by default none."""
     mp4: Path | None = None
-    """Write a video to this file instead."""
+    """Write a video to this file instead; by default none."""
     film: Annotated[FilmOptions, arg(name="")] = field(default_factory=FilmOptions)
     """Size and rate of pictures and films."""
 
