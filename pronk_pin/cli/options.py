@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin, is_typeddict
 
 from tyro.conf import arg
 from tyro.constructors import (
@@ -37,12 +37,13 @@ def _command(info: StructTypeInfo) -> StructConstructorSpec | None:
         _asked.pop()
     if not isinstance(spec, StructConstructorSpec):
         return None
-    return dataclasses.replace(spec, fields=tuple(map(_option, spec.fields)))
+    values = "(here: {})" if is_typeddict(info.type) else "(default: {})"
+    return dataclasses.replace(spec, fields=tuple(_option(part, values) for part in spec.fields))
 
 
-def _option(field: StructFieldSpec) -> StructFieldSpec:
+def _option(field: StructFieldSpec, values: str) -> StructFieldSpec:
     """An option whose text flows, and whose default is shown where it is a value; where it is none,
-    its text says what happens."""
+    its text says what happens. A dictionary's texts always do: what is in it was asked for."""
     kind: Any = field.type
     kind, *marks = get_args(kind) if get_origin(kind) is Annotated else (kind,)
     spec = _spec(kind)
@@ -50,9 +51,9 @@ def _option(field: StructFieldSpec) -> StructFieldSpec:
         kind = object  # for what is no plain class tyro imports typeguard, which takes long
         marks.append(spec)
     value = isinstance(field.default, bool | int | float | str | tuple | Path)
-    if not value or field.default in ("", ()):
-        marks.insert(0, arg(help_behavior_hint=""))
-    shown: Any = Annotated[(kind, *marks)] if marks else kind
+    hint = "" if not value or field.default in ("", ()) else values
+    marks.insert(0, arg(help_behavior_hint=hint.format))
+    shown: Any = Annotated[(kind, *marks)]
     return dataclasses.replace(field, type=shown, helptext=lambda: _text(field))
 
 

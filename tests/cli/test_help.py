@@ -139,14 +139,14 @@ def test_the_help_has_the_values_of_a_suite_or_a_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shown = options(help_of(["compare", "--suite", "pairs", "--seeds", "3"], capsys))
-    assert shown["--speeds"].endswith("(default: -0.4 0.0 0.4 0.8)")
-    assert shown["--schedule.learning"].endswith("(default: 60.0)")
-    assert shown["--seeds"].endswith("(default: 3)")
+    assert shown["--speeds"].endswith("(here: -0.4 0.0 0.4 0.8)")
+    assert shown["--schedule.learning"].endswith("(here: 60.0)")
+    assert shown["--seeds"].endswith("(here: 3)")
     path = tmp_path / "mine.yaml"
     path.write_text("controllers: [pd, ilc]\nrobot: go1\n")
     shown = options(help_of(["compare", "--config", str(path)], capsys))
-    assert shown["--controllers"].endswith("(default: pd ilc)")
-    assert shown["--robot"].endswith("(default: go1)")
+    assert shown["--controllers"].endswith("(here: pd ilc)")
+    assert shown["--robot"].endswith("(here: go1)")
 
 
 def test_what_is_not_given_stays_as_the_file_has_it(tmp_path: Path) -> None:
