@@ -44,10 +44,8 @@ def test_examples_are_short() -> None:
 def test_commands_are_understood(monkeypatch: pytest.MonkeyPatch) -> None:
     commands = re.findall(r"^pronk-pin ([^#\n]*)", README, flags=re.MULTILINE)
     assert len(commands) >= 5
-    kinds = [each for each in vars(cli).values() if hasattr(each, "run")]
-    assert cli.Reproduce in kinds
-    for kind in kinds:
-        monkeypatch.setattr(kind, "run", lambda self: None)
+    for kind in cli.COMMANDS.values():
+        monkeypatch.setattr(kind, "run", lambda self: getattr(self, "experiment", None) and None)
     for command in commands:
         assert cli.main(shlex.split(command)) == 0, command
 

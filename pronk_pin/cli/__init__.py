@@ -1,33 +1,37 @@
-"""The command line `pronk-pin`, whose commands have no logic of their own."""
+"""The command line `pronk-pin`, whose commands have no logic of their own.
+
+A command imports what it needs when it runs: its help and its options are to cost nothing but
+themselves, and the libraries take seconds. Hence the imports within functions, here alone.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
+import operator
+import os
 import signal
 import sys
 import textwrap
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
-from itertools import pairwise
-from pathlib import Path
+from dataclasses import make_dataclass
 from types import FrameType
-from typing import Annotated, Any, Protocol, TextIO, Union
+from typing import Annotated, Any, Protocol, TextIO
 
 import tyro
-from tyro.conf import OmitSubcommandPrefixes, subcommand
+from tyro.conf import FlagCreatePairsOff, OmitSubcommandPrefixes, arg, subcommand
 
-from .._checks import known_name
+from .. import __version__
 from .._workers import handling
-from ..compare import Results
-from ..compare.experiment import SUITES, load_suite, read_config
-from ..errors import LeakyFilter, OtherMachine, PartNotShown, PronkError
+from ..errors import LeakyFilter, OtherMachine, PartNotShown, PronkError, UnknownName
 from .comparison import Compare, Explain, Report, Reproduce
 from .gaits import Gaits
 from .ilc import Ilc
 from .listing import List
+from .options import REGISTRY
 from .parity import Parity
 from .view import View
 
@@ -45,49 +49,31 @@ RENAMED: dict[str, str] = {
 }
 """Options that the last release knew by another name, with their names of today."""
 
+COMMANDS: Mapping[str, type[_Runs]] = {
+    "compare": Compare,
+    "gaits": Gaits,
+    "ilc": Ilc,
+    "view": View,
+    "report": Report,
+    "reproduce": Reproduce,
+    "explain": Explain,
+    "parity": Parity,
+    "list": List,
+}
+"""The commands by name."""
 
-def _commands(arguments: list[str]) -> Any:
-    """All commands; the defaults of `compare` are those of the suite or of the file that is asked
-    for, or what is in the results folder that it is to go on with."""
-    words = [word for argument in arguments for word in argument.split("=", 1)]
-    following = dict(pairwise(words))
-    suite = following.get("--suite", "default")
-    known_name("suite", suite, SUITES)
-    # Speeds and controllers begin with those of the robot and its gaits.
-    options = ("robot", "gaits", "base") if words[:1] == ["compare"] else ()
-    given = {name: following[f"--{name}"] for name in options if f"--{name}" in following}
-    experiment = load_suite(suite, **given)
-    folder = Path(following.get("--folder", ""))
-    if (
-        words[:1] == ["compare"]
-        and not {"--suite", "--config"} & set(words)
-        and (folder / "config.json").is_file()
-    ):
-        experiment = replace(Results.load(folder).experiment, batches=())
-    config = following.get("--config") if words[:1] == ["compare"] else None
-    if config is not None:
-        experiment = read_config(config)
-    default = Compare(experiment=experiment, suite=suite)
-    return Union[  # noqa: UP007 -- its first member is made here
-        Annotated[Compare, subcommand("compare", default=default)], Command
-    ]
+_PURPOSE = "When a legged robot repeats a motion, does practice beat the model?"
+_HELP = ("-h", "--help")
+SHELLS = ("bash", "zsh", "fish")
+"""Shells that can complete commands and options."""
 
-
-Command = (
-    Annotated[Gaits, subcommand("gaits")]
-    | Annotated[Ilc, subcommand("ilc")]
-    | Annotated[View, subcommand("view")]
-    | Annotated[Report, subcommand("report")]
-    | Annotated[Reproduce, subcommand("reproduce")]
-    | Annotated[Explain, subcommand("explain")]
-    | Annotated[Parity, subcommand("parity")]
-    | Annotated[List, subcommand("list")]
-)
+_COMPLETION = ("--tyro-print-completion", "--tyro-write-completion")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Entry point; the exit code is 0, 1 for an error of ours or models that differ, 2 for wrong
-    usage, 130 on Ctrl-C, and 143 or 129 where the program is asked to end by SIGTERM or SIGHUP."""
+    usage, 130 on Ctrl-C, 141 where nobody reads the output any more, and 143 or 129 where the
+    program is asked to end by SIGTERM or SIGHUP: docs/commands.md."""
     with _orderly_end() as asked:
         try:
             return _run(arguments)
@@ -95,6 +81,11 @@ def main(arguments: list[str] | None = None) -> int:
             if not asked:
                 print(f"pronk-pin: {' '.join(str(error).splitlines())}", file=sys.stderr)
                 return 1
+        except BrokenPipeError:
+            if not asked:
+                if not _unread():
+                    raise
+                return 128 + signal.SIGPIPE
         except KeyboardInterrupt:
             if not asked:
                 print("pronk-pin: interrupted", file=sys.stderr)
@@ -108,12 +99,32 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _run(arguments: list[str] | None) -> int:
-    command = _parsed(todays_options(sys.argv[1:] if arguments is None else arguments))
+    arguments = todays_options(sys.argv[1:] if arguments is None else arguments)
+    if arguments[:1] == ["--version"]:
+        print(f"pronk-pin {__version__}")
+        return 0
+    if arguments and arguments[0] in _COMPLETION:
+        shell = "".join(arguments[1:2])
+        if shell not in SHELLS:
+            raise UnknownName("shell", shell, SHELLS)
+    command = _parsed(arguments)
     with warnings.catch_warnings():
         for category in (LeakyFilter, OtherMachine, PartNotShown):
             warnings.simplefilter("once", category)
         warnings.showwarning = _show_warning
-        return command.run() or 0
+        code = command.run() or 0
+    sys.stdout.flush()  # while it is known what to do where nobody reads on
+    return code
+
+
+def _unread() -> bool:
+    """Whether nobody reads the output any more, as after `| head`; what is left of it goes."""
+    try:
+        print(flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return True
+    return False
 
 
 @contextmanager
@@ -135,15 +146,47 @@ def _orderly_end() -> Iterator[list[int]]:
 
 def _parsed(arguments: list[str]) -> _Runs:
     """The command that the arguments ask for; wrong usage ends the program, told in one line."""
+    name, *words = arguments or [""]
+    if name not in COMMANDS:  # help, completion, or wrong usage
+        name, asked, words = "", _program(whole=name in _COMPLETION), arguments
+    else:
+        asked = COMMANDS[name]
+    given = [word for word in words if word not in _HELP]
+    if name == "compare" and given and given != words:  # help, with the values of a suite, say
+        begun: Compare = _read(name, asked, given)
+        _read(name, asked, words, default=begun.with_values())
+    command: _Runs = _read(name, asked, words)
+    return command
+
+
+def _program(*, whole: bool) -> Any:
+    """All commands: whole, or only what each is for, which is all that their list shows."""
+    kinds: list[Any] = []
+    for name, kind in COMMANDS.items():
+        only_said = make_dataclass(kind.__name__, (), namespace={"__doc__": kind.__doc__})
+        kinds.append(Annotated[kind if whole else only_said, subcommand(name)])
+    version = Annotated[
+        bool, FlagCreatePairsOff, arg(help="Print the version.", help_behavior_hint="")
+    ]
+    return make_dataclass(
+        "Program",
+        [("command", functools.reduce(operator.or_, kinds)), ("version", version, False)],
+        namespace={"__doc__": _PURPOSE},
+    )
+
+
+def _read(name: str, asked: Any, words: list[str], **default: Any) -> Any:
+    """Read the words that stand after a command's name."""
     told = io.StringIO()
     try:
         with contextlib.redirect_stderr(told):
-            command: _Runs = tyro.cli(
-                _commands(arguments),
-                prog="pronk-pin",
-                description="When a legged robot repeats a motion, does practice beat the model?",
-                args=arguments,
+            command = tyro.cli(
+                asked,
+                prog=f"pronk-pin {name}".strip(),
+                args=words,
                 config=(OmitSubcommandPrefixes,),
+                registry=REGISTRY,
+                **default,
             )
     except SystemExit:
         if text := _in_one_line(told.getvalue()):

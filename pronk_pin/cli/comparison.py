@@ -6,32 +6,61 @@ import dataclasses
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
-import numpy as np
 from tyro.conf import Positional, arg
 
-from .._checks import none_or, real, seed, whole
-from ..compare import (
-    Experiment,
-    Results,
-    default_folder,
-    describe,
-    explain,
-    mjcf_parity,
-    run_experiment,
-)
-from ..compare.experiment import SUITES, load_suite
-from ..compare.identification import DRAWS, IMU_NOISE, check_learner
-from ..compare.report import format_changes, format_summary
-from ..compare.studies import close_loop, format_loop, format_reproduction
-from ..errors import PronkError
-from ..robot.formats import write_mjcf, write_urdf
-from ..viz import known_figure, write_replay
-from ..viz.figures import write_explanation_figure
-from ..viz.report import write_figures, write_report
-from ..viz.scenes import nearest, result_menu
+if TYPE_CHECKING:
+    from ..compare import Experiment, Results
+
+
+class ScheduleOptions(TypedDict, total=False):
+    """What happens when: the paper's procedure."""
+
+    startup: float
+    """Standing in the posture of the first stride [s]; by default 0.5."""
+    baseline: float
+    """Pronking without learning [s]; by default 20."""
+    learning: float
+    """Pronking with the learning law switched on [s]; by default 20."""
+    scatter: float
+    """Standard deviation of the joint angles at the start [rad]; by default 0.01."""
+
+
+class ExperimentOptions(TypedDict, total=False):
+    """Fields of an `Experiment`, by name: what its documentation says, for the command line."""
+
+    robot: Annotated[str, arg(metavar="NAME|FILE|MODULE:OBJECT")]
+    """Robot: a name of `pronk-pin list robots`, a TOML file, or an address; by default a1."""
+    gaits: Annotated[str, arg(metavar="NAME|FILE")]
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`; by default
+    pronk."""
+    apex: float | None
+    """Apex of the gaits [m], one that the library covers; by default the library's own."""
+    speeds: tuple[float, ...]
+    """Desired speeds [m/s]; by default all of the gait library, the A1's -0.5 to 0.8."""
+    controllers: Annotated[tuple[str, ...], arg(metavar="[NAME|MODULE:OBJECT [...]]")]
+    """Controllers: names of `pronk-pin list controllers`, or addresses; by default pd, ilc-paper,
+    ilc-stance, ilc, ilc+rotors, model, model+rotors and library, less those that need rotors which
+    are not known of the robot."""
+    scenarios: Annotated[tuple[str, ...], arg(metavar="[NAME|MODULE:OBJECT [...]]")]
+    """Scenarios: names of `pronk-pin list scenarios`, composed with "+", values with "=", as
+    payload=2+slope; or addresses; by default nominal."""
+    seeds: tuple[int, ...]
+    """Seeds of the scatter at the start, of noise, and of rough ground and steps; by default 0.
+    Where nothing is random they hardly differ; rough is the scenario for many."""
+    base: str
+    """How the trunk may move: locked to x and z, sagittal with pitch, or free; by default
+    locked."""
+    mjcf: str
+    """MJCF of the robot, with the same joint names, that stands in for its URDF in the simulation;
+    by default the URDF is simulated. Scenarios add to what is in it: ideal takes it as it is."""
+    schedule: ScheduleOptions
+    """What happens when."""
+    metrics: Annotated[tuple[str, ...], arg(metavar="[MODULE:OBJECT [...]]")]
+    """Metrics of your own, beside those of `pronk-pin list metrics`; by default none."""
 
 
 @dataclass(frozen=True)
@@ -42,25 +71,72 @@ class Compare:
     scenarios, speeds or seeds it adds them to what is there.
     """
 
-    experiment: Annotated[Experiment, arg(name="")] = field(default_factory=Experiment)
+    options: Annotated[ExperimentOptions, arg(name="")] = field(default_factory=ExperimentOptions)
     """The experiment."""
     config: Path | None = None
-    """Experiment in a YAML file, or the config.json of a result, which the other options change."""
-    suite: str = "default"
-    """A named experiment, which the other options change: see `pronk-pin list
-    suites`."""
+    """Experiment in a YAML file, or the config.json of a result, which the other options change; by
+    default that of the folder, if it has one, or else of the suite."""
+    suite: str | None = None
+    """A named experiment, which the other options change, of `pronk-pin list suites`; by default
+    the one called default. With --help its values are shown."""
     folder: Path | None = None
-    """Results folder; by default results/<time>-comparison."""
+    """Results folder; by default results/<time>-comparison, or -<suite>."""
     workers: int | None = None
     """Processes; by default one for each core."""
     executor: str | None = None
-    """Who simulates instead of these processes: dask://HOST:PORT of a dask scheduler."""
+    """Who simulates instead of these processes, as dask://HOST:PORT of a dask scheduler; by default
+    nobody."""
     resimulate: bool = False
     """Simulate again what the folder has damaged, or of something else, instead of refusing it."""
 
+    @cached_property
+    def experiment(self) -> Experiment:
+        """The experiment of the file, folder or suite that is asked for, with all that is given."""
+        from ..compare import Results, Schedule
+        from ..compare.experiment import load_suite, read_config
+
+        given: dict[str, Any] = {**self.options}
+        # Speeds and controllers begin with those of the robot and its gaits.
+        first = {name: given[name] for name in ("robot", "gaits", "base") if name in given}
+        begun = load_suite(self.suite or "default", **first)
+        if self.config is not None:
+            begun = read_config(self.config)
+        elif self.suite is None and self.folder and (self.folder / "config.json").is_file():
+            begun = dataclasses.replace(Results.load(self.folder).experiment, batches=())
+        schedule: dict[str, float] = given.pop("schedule", {})
+        if schedule:
+            given["schedule"] = Schedule(**{**dataclasses.asdict(begun.schedule), **schedule})
+        return dataclasses.replace(begun, **given) if given else begun
+
+    def with_values(self) -> Compare:
+        """The same with every option of the experiment given, as the help is to show them."""
+        from ..compare.experiment import name_of
+
+        experiment = self.experiment
+        schedule: Any = dataclasses.asdict(experiment.schedule)
+        return dataclasses.replace(
+            self,
+            options=ExperimentOptions(
+                robot=experiment.robot_name,
+                gaits=name_of(experiment.gaits),
+                apex=experiment.apex,
+                speeds=experiment.speeds,
+                controllers=experiment.controller_names,
+                scenarios=experiment.scenario_names,
+                seeds=experiment.seeds,
+                base=experiment.base,
+                mjcf=experiment.mjcf,
+                schedule=schedule,
+                metrics=tuple(map(name_of, experiment.metrics)),
+            ),
+        )
+
     def run(self) -> None:
         """Do it."""
-        name = "comparison" if self.suite == "default" else self.suite
+        from ..compare import default_folder, mjcf_parity, run_experiment
+        from ..compare.report import format_summary
+
+        name = "comparison" if self.suite in (None, "default") else self.suite
         folder, world = self.folder or default_folder(name), self.experiment.mjcf
         if world:
             print(mjcf_parity(self.experiment.model, world).table())
@@ -95,6 +171,10 @@ class Reproduce:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import default_folder, run_experiment
+        from ..compare.experiment import load_suite
+        from ..compare.studies import format_reproduction
+
         experiment = dataclasses.replace(load_suite("paper"), seeds=self.seeds)
         folder = self.folder or default_folder("paper")
         results = run_experiment(experiment, folder, workers=self.workers)
@@ -113,12 +193,16 @@ class Report:
     result: Positional[Path]
     """Results folder."""
     other: Positional[Path | None] = None
-    """Results folder to compare it with."""
+    """Results folder to compare it with; by default none."""
     figures: Path | None = None
-    """Write the figures into this folder too, as SVG."""
+    """Write the figures into this folder too, as SVG and PDF; by default into the report alone."""
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import Results
+        from ..compare.report import format_changes, format_summary
+        from ..viz.report import write_figures
+
         results = Results.load(self.result)
         if self.other is not None:
             print(format_changes(results, Results.load(self.other)))
@@ -145,13 +229,14 @@ class Explain:
     scenario: str | None = None
     """Scenario of its strides; by default the first."""
     figure: Path | None = None
-    """Draw the learned torque by cause into this file: png, svg or pdf."""
+    """Draw the learned torque by cause into this file: png, svg or pdf; by default it is not
+    drawn."""
     speed: float | None = None
     """Speed that the figure shows [m/s]; by default the one nearest to 0.5."""
     write_urdf: Path | None = None
-    """Write the identified model to this URDF."""
+    """Write the identified model to this URDF; by default it is not written."""
     write_mjcf: Path | None = None
-    """Write the identified model to this MJCF."""
+    """Write the identified model to this MJCF; by default it is not written."""
     close_loop: bool = False
     """Try the identified model, with its gaits optimised again, beside the model, the torque
     library and learning, at speeds halfway between those of the result and with 3 kg more."""
@@ -164,6 +249,14 @@ class Explain:
 
     def run(self) -> None:
         """Do it."""
+        import numpy as np
+
+        from ..compare import Results, describe, explain
+        from ..compare.studies import close_loop, format_loop
+        from ..robot.formats import write_mjcf, write_urdf
+        from ..viz.figures import write_explanation_figure
+        from ..viz.scenes import nearest
+
         self._check()
         results = Results.load(self.result)
         if self.speed is not None:
@@ -193,6 +286,10 @@ class Explain:
 
     def _check(self) -> None:
         """What can be told to be wrong before anything is read."""
+        from .._checks import none_or, real, seed, whole
+        from ..compare.identification import DRAWS, IMU_NOISE, check_learner
+        from ..viz import known_figure
+
         seed("seed", self.seed)
         real("imu-noise", self.imu_noise, IMU_NOISE)
         whole("draws", self.draws, DRAWS)
@@ -204,6 +301,8 @@ class Explain:
 
 def command_line(experiment: Experiment) -> str:
     """The command that runs an experiment; objects of one's own are read from its config.json."""
+    from ..compare.experiment import SUITES, load_suite
+
     for name in SUITES:
         if load_suite(name) == experiment:
             return f"pronk-pin compare --suite {name}"
@@ -229,11 +328,16 @@ def command_line(experiment: Experiment) -> str:
 
 
 def _report(results: Results) -> Path:
+    from ..viz.report import write_report
+
     return write_report(results, command=command_line(results.experiment))
 
 
 def _print_pages(results: Results, report: str) -> None:
     """Where result, report and replay are; the replay is written here."""
+    from ..viz import write_replay
+    from ..viz.scenes import result_menu
+
     page = results.folder / "replay.html"
     print(f"\nresults  {results.folder}")
     print(f"report   {report}")
@@ -242,6 +346,8 @@ def _print_pages(results: Results, report: str) -> None:
 
 def _made(write: Callable[[], Path]) -> str:
     """The path of a page, or why there is none: what is finished is not undone by its pictures."""
+    from ..errors import PronkError
+
     try:
         return str(write())
     except Exception as error:  # of any library that draws

@@ -4,23 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, subcommand
 
-from .._checks import shown
-from ..errors import InvalidInput, UnknownName
-from ..gait import (
-    GaitLibrary,
-    build_library,
-    describe_gait,
-    describe_library,
-    known_base,
-    load_library,
-    number_range,
-)
-from ..robot import Robot, load_robot, load_robot_spec
-from ..viz.figures import write_gait_figures
+if TYPE_CHECKING:
+    from ..gait import GaitLibrary
+    from ..robot import Robot
 
 
 @dataclass(frozen=True)
@@ -52,6 +42,11 @@ class Build:
 
     def run(self) -> None:
         """Do it."""
+        from .._checks import shown
+        from ..errors import InvalidInput
+        from ..gait import build_library, describe_library, known_base, number_range
+        from ..robot import load_robot
+
         if not self.output.name or self.output.is_dir():
             raise InvalidInput(
                 f"output={shown(str(self.output))} is no file; give the name of one, as gaits.npz"
@@ -101,6 +96,8 @@ class Show(_OfLibrary):
 
     def run(self) -> None:
         """Do it."""
+        from ..gait import describe_gait, describe_library
+
         library = self.load()
         if self.speed is None:
             shown_gaits = library if self.apex is None else library.at_apex(self.apex)
@@ -123,6 +120,8 @@ class Plot(_OfLibrary):
 
     def run(self) -> None:
         """Do it."""
+        from ..viz.figures import write_gait_figures
+
         library = self.load()
         paths = write_gait_figures(
             library,
@@ -155,6 +154,9 @@ def open_library(
     path: Path | None, robot: str, gait: str, base: str | None, *, audited: bool = True
 ) -> GaitLibrary:
     """A library from a file, or one that is shipped."""
+    from ..gait import GaitLibrary, known_base, load_library
+    from ..robot import load_robot
+
     machine = load_robot(robot)
     if path is None:
         return load_library(
@@ -172,6 +174,9 @@ def robot_of(library: GaitLibrary, robot: str) -> Robot:
     Raises:
         InvalidInput: It is neither.
     """
+    from ..errors import InvalidInput, UnknownName
+    from ..robot import load_robot, load_robot_spec
+
     spec = load_robot_spec(robot)
     if spec.name == library.robot:
         return load_robot(spec)

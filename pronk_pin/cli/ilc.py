@@ -4,46 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, subcommand
 
-from .._checks import whole
-from ..compare import Results, load_scenario
-from ..compare.studies import (
-    COUPLINGS,
-    DRIVERS,
-    RAMPS,
-    STRIDES,
-    SWEEPS,
-    compare_prediction,
-    describe_driving,
-    describe_gains,
-    describe_prediction,
-    describe_seeding,
-    describe_stability,
-    describe_transfers,
-    describe_wandering,
-    measure_driving,
-    measure_seeding,
-    measure_stability,
-    measure_transfers,
-    measure_wandering,
-    simulate_learning,
-    stored_learning,
-    sweep_gains,
-)
-from ..control import load_controller
-from ..gait import Gait, load_library
-from ..robot import load_robot
-from ..viz import known_figure, save_figure
-from ..viz.figures import (
-    driving_figure,
-    errors_by_seed,
-    gains_figure,
-    predicted_and_measured,
-    transfers_figure,
-)
+if TYPE_CHECKING:
+    from ..gait import Gait
 
 _FINE = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
 """Speeds [m/s] of studies that need neighbours."""
@@ -51,6 +17,9 @@ _FINE = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
 
 def _covered(robot: str, speeds: tuple[float, ...]) -> tuple[float, ...]:
     """Those of some speeds [m/s] that the gaits shipped for a robot cover."""
+    from ..gait import load_library
+    from ..robot import load_robot
+
     covered = load_library(load_robot(robot).name).speeds
     return tuple(speed for speed in speeds if covered[0] <= speed <= covered[-1])
 
@@ -81,6 +50,19 @@ class Analyze:
 
     def run(self) -> None:
         """Do it."""
+        from .._checks import whole
+        from ..compare import Results, load_scenario
+        from ..compare.studies import (
+            STRIDES,
+            compare_prediction,
+            describe_prediction,
+            simulate_learning,
+            stored_learning,
+        )
+        from ..control import load_controller
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import predicted_and_measured
+
         whole("strides", self.strides, STRIDES)
         known_figure(self.figure)
         gaits: list[Gait] | None = None  # those that are shipped
@@ -120,13 +102,17 @@ class Stability:
     """Speeds [m/s]; by default 0.6 and 0.8, if the robot's gaits cover them."""
     scenario: str = "payload+delay"
     """Scenario of the learning."""
-    couplings: tuple[float, ...] = COUPLINGS
+    couplings: tuple[float, ...] = (1.0, 0.8, 0.6, 0.5, 0.0)
     """Shares of the stance's errors that the flight's law is shown."""
     robot: str = "a1"
     """Robot."""
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_stability, measure_stability
+        from ..control import load_controller
+
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         speeds = self.speed or _covered(self.robot, (0.6, 0.8))
         table = measure_stability(
@@ -142,10 +128,11 @@ class Drive:
     Gaits are chosen anew at each stride, between those of the library: eq. (13) of the paper.
     """
 
-    command: tuple[str, ...] = RAMPS
+    command: tuple[str, ...] = ()
     """Speed profiles, each in quotes: "0 4s, 0->0.8 2s, 0.8 4s", a speed [m/s] and how long, or two
-    with an arrow. Where a piece begins at another speed than the last ended, the command steps."""
-    controllers: tuple[str, ...] = DRIVERS
+    with an arrow. Where a piece begins at another speed than the last ended, the command steps. By
+    default ramps and steps up and down."""
+    controllers: tuple[str, ...] = ("pd", "model", "library", "library+ilc")
     """Controllers."""
     scenario: str = "nominal"
     """Scenario, of the learning and of the driving."""
@@ -158,9 +145,14 @@ class Drive:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import RAMPS, describe_driving, measure_driving
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import driving_figure
+
         known_figure(self.figure)
         table = measure_driving(
-            self.command,
+            self.command or RAMPS,
             load_scenario(self.scenario),
             controllers=self.controllers,
             robot=self.robot,
@@ -174,8 +166,9 @@ class Drive:
 class Wander:
     """Learn from nothing while the speed changes, and say what that is worth at constant speeds."""
 
-    command: str = SWEEPS
-    """Speed profile of the learning, as in `pronk-pin ilc drive`."""
+    command: str = ""
+    """Speed profile of the learning, as in `pronk-pin ilc drive`; by default a minute that sweeps
+    twice over all speeds."""
     scenario: str = "nominal"
     """Scenario."""
     robot: str = "a1"
@@ -183,7 +176,11 @@ class Wander:
 
     def run(self) -> None:
         """Do it."""
-        table = measure_wandering(self.command, load_scenario(self.scenario), robot=self.robot)
+        from ..compare import load_scenario
+        from ..compare.studies import SWEEPS, describe_wandering, measure_wandering
+
+        command, scenario = self.command or SWEEPS, load_scenario(self.scenario)
+        table = measure_wandering(command, scenario, robot=self.robot)
         print(describe_wandering(table))
 
 
@@ -207,6 +204,12 @@ class Gains:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_gains, sweep_gains
+        from ..control import load_controller
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import gains_figure
+
         known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         speeds = self.speed or _covered(self.robot, (-0.4, 0.0, 0.4, 0.8))
@@ -239,6 +242,12 @@ class Transfer:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_transfers, measure_transfers
+        from ..control import load_controller
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import transfers_figure
+
         known_figure(self.figure)
         table = measure_transfers(
             load_controller(self.controller),
@@ -270,6 +279,11 @@ class Seeding:
 
     def run(self) -> None:
         """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_seeding, measure_seeding
+        from ..viz import known_figure, save_figure
+        from ..viz.figures import errors_by_seed
+
         known_figure(self.figure)
         speeds = self.speed or _covered(self.robot, _FINE)
         table = measure_seeding(speeds, load_scenario(self.scenario), robot=self.robot)

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from tyro.conf import Positional
 
-from .._registry import announced_names
-from ..compare import KNOWN
-from ..compare.experiment import SUITES, load_suite
-from ..compare.metrics import METRICS
-from ..compare.world import BASE_SCENARIOS
-from ..control import CONTROLLERS, ControllerSpec, load_controller
-from ..gait import shipped_libraries
-from ..robot import ROBOTS, load_robot_spec
+if TYPE_CHECKING:
+    from ..control import ControllerSpec
 
 Kind: TypeAlias = Literal["controllers", "robots", "gaits", "scenarios", "metrics", "suites"]
 
@@ -36,29 +30,50 @@ class List:
 
 
 def _controllers() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..control import CONTROLLERS, load_controller
+
     for name in (*CONTROLLERS, *announced_names("controller")):
         yield name, _what_it_does(load_controller(name))
 
 
+_MODELS = {"datasheet": "datasheet's rotors", "identified": "identified model"}
+
+
 def _what_it_does(spec: ControllerSpec) -> str:
-    learned = [part for part, law in zip(("stance", "flight"), spec.laws, strict=True) if law]
+    learned = [
+        f"{part} ({type(law).__name__}{', gain 0' if getattr(law, 'gain', None) == 0 else ''})"
+        for part, law in zip(("stance", "flight"), spec.laws, strict=True)
+        if law
+    ]
     torque = type(spec.tick_controller).__name__ if spec.tick_controller else ""
-    begins = "" if spec.source == "none" else f"begins with torques of the {spec.source}"
+    source = {"library": "torque library", "identified": "identified model"}.get(spec.source)
+    begins = "" if spec.source == "none" else f"begins with torques of the {source or 'model'}"
     parts = (
         f"computes torques at every tick ({torque})" if torque else begins,
         f"learns in {' and '.join(learned)}" if learned else "",
         "adapts the flight's duration" if spec.timing else "",
+        "" if spec.gait_model == "urdf" else f"gaits planned with the {_MODELS[spec.gait_model]}",
+        "" if spec.stiffness == 1.0 else f"gains {spec.stiffness:g} times as stiff",
+        "feels its trunk by an IMU" if spec.imu else "",
         f"knows {', '.join(spec.knows)}" if spec.knows else "knows nothing",
     )
-    return "; ".join(filter(None, parts))
+    return "; ".join(filter(None, parts) if any(parts[:-1]) else ("feedback alone", parts[-1]))
 
 
 def _robots() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..robot import ROBOTS, load_robot_spec
+
     for name in (*ROBOTS, *announced_names("robot")):
-        yield name, load_robot_spec(name).urdf
+        spec = load_robot_spec(name)
+        rotors = "known" if spec.rotors else "not known"
+        yield name, f"{len(spec.legs)} legs, rotors {rotors}, {spec.urdf}"
 
 
 def _gaits() -> Iterator[tuple[str, str]]:
+    from ..gait import shipped_libraries
+
     for library in sorted(shipped_libraries(), key=lambda one: (one.robot, one.base)):
         speeds, apexes = library.speeds, library.apexes
         gait = library.metadata.get("gait", "pronk")
@@ -68,9 +83,19 @@ def _gaits() -> Iterator[tuple[str, str]]:
         )
 
 
+_WORLDS = {
+    "ideal": "the robot as its URDF has it",
+    "nominal": "with the rotors' inertia and the friction that URDFs leave out",
+}
+
+
 def _scenarios() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..compare import KNOWN
+    from ..compare.world import BASE_SCENARIOS
+
     for name in BASE_SCENARIOS:
-        yield name, "a world to begin with"
+        yield name, f"a world to begin with: {_WORLDS[name]}"
     for name, mismatch in KNOWN.items():
         yield f"{name}={mismatch.value:g}", f"{mismatch.text} [{mismatch.unit}]"
     yield "random-SEED-INDEX", "a sampled scenario"
@@ -79,6 +104,9 @@ def _scenarios() -> Iterator[tuple[str, str]]:
 
 
 def _metrics() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..compare.metrics import METRICS
+
     for name, (unit, text) in METRICS.items():
         yield f"{name} [{unit}]", text
     for name in announced_names("metric"):
@@ -86,6 +114,8 @@ def _metrics() -> Iterator[tuple[str, str]]:
 
 
 def _suites() -> Iterator[tuple[str, str]]:
+    from ..compare.experiment import SUITES, load_suite
+
     for name in SUITES:
         suite = load_suite(name)
         yield (

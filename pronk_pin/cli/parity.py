@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from tyro.conf import Positional
-
-from .._checks import seed
-from ..parity import compare_models
-from ..robot import load_robot
-from ..robot.formats import mujoco_spec
 
 
 @dataclass(frozen=True)
@@ -24,9 +18,9 @@ class Parity:
     """
 
     model: Positional[Path | None] = None
-    """MJCF or URDF to compare with."""
+    """MJCF or URDF to compare with; by default MuJoCo's reading of our URDF."""
     robot: str = "a1"
-    """Robot it should be: its name, or the TOML file of one of your own."""
+    """Robot it should be: a name of `pronk-pin list robots`, a TOML file, or an address."""
     states: int = 200
     """Number of random states."""
     seed: int = 0
@@ -39,6 +33,13 @@ class Parity:
 
     def run(self) -> int:
         """Do it; the exit code is 0 where the two are the same."""
+        import numpy as np
+
+        from .._checks import seed
+        from ..parity import compare_models
+        from ..robot import load_robot
+        from ..robot.formats import mujoco_spec
+
         seed("seed", self.seed)
         robot = load_robot(self.robot)
         parity = compare_models(

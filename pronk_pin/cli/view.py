@@ -4,17 +4,36 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 from tyro.conf import Positional, arg
 
-from .._checks import NOT_NEGATIVE, none_or, real, whole
-from ..compare import Results
-from ..errors import FileProblem, InvalidInput
-from ..viz import Film, Menu, library_menu, serve, write_film, write_png, write_replay
-from ..viz.player import DURATION, known_port
-from ..viz.scenes import result_menu
 from .gaits import open_library, robot_of
+
+if TYPE_CHECKING:
+    from ..viz import Menu
+
+
+class FilmOptions(TypedDict, total=False):
+    """Fields of a `viz.Film`."""
+
+    width: int
+    """Width of the picture [pixels]; by default 800."""
+    height: int
+    """Height of the picture [pixels]; by default 600."""
+    plots: bool
+    """Show the plots of error and torque beside the robots; by default they are left out."""
+    color: str
+    """Colour the links by "error" or "torque"; by default as they are."""
+    fps: float
+    """Frames for each second of the film; by default 25."""
+    rate: float
+    """Seconds of the scene for each second of the film; below 1 for slow motion; by default 1."""
+    at: float
+    """Time at which the film begins, or of the picture, from the scene's beginning [s]; by default
+    0."""
+    seconds: float | None
+    """How much of the scene the film shows [s]; by default to its end."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +54,8 @@ class View:
     scenario: str | None = None
     """Scenario of a result; by default the first."""
     beside: str | None = None
-    """Robot to show beside it: another controller of the result, or 'before learning'."""
+    """Robot to show beside it: another controller of the result, or 'before learning'; by
+    default none."""
     stride: int | None = None
     """Show the dozen strides of a result with this one; by default those around the start of
     learning."""
@@ -54,18 +74,23 @@ class View:
     duration: float | None = None
     """End the page after so many seconds; by default on Ctrl-C."""
     html: Path | None = None
-    """Write the page to this file instead: it opens offline."""
+    """Write the page to this file instead, which opens offline; by default it is served."""
     png: Path | None = None
-    """Write a picture to this file instead."""
+    """Write a picture to this file instead; by default none."""
     gif: Path | None = None
-    """Write an animation to this file instead."""
+    """Write an animation to this file instead; by default none."""
     mp4: Path | None = None
-    """Write a video to this file instead."""
-    film: Annotated[Film, arg(name="")] = field(default_factory=Film)
+    """Write a video to this file instead; by default none."""
+    film: Annotated[FilmOptions, arg(name="")] = field(default_factory=FilmOptions)
     """Size and rate of pictures and films."""
 
     def run(self) -> None:
         """Do it."""
+        from .._checks import NOT_NEGATIVE, none_or, real, whole
+        from ..viz import Film, serve, write_film, write_png, write_replay
+        from ..viz.player import DURATION, known_port
+
+        film = Film(**self.film)
         known_port(self.port)
         none_or(real, "duration", self.duration, DURATION)
         for name in ("speed", "apex"):
@@ -75,10 +100,10 @@ class View:
         if self.html is not None:
             print(f"replay  {write_replay(menu, self.html)}")
         if self.png is not None:
-            print(f"picture {write_png(menu.scene(), self.png, self.film)}")
+            print(f"picture {write_png(menu.scene(), self.png, film)}")
         for path in (self.gif, self.mp4):
             if path is not None:
-                print(f"film    {write_film(menu.scene(), path, self.film)}")
+                print(f"film    {write_film(menu.scene(), path, film)}")
         if all(path is None for path in (self.html, self.png, self.gif, self.mp4)):
             serve(
                 menu,
@@ -90,11 +115,18 @@ class View:
 
     def _refuse(self, options: tuple[str, ...], other: str) -> None:
         """Refuse options of something else than what is shown."""
+        from ..errors import InvalidInput
+
         for name in options:
             if getattr(self, name) is not None:
                 raise InvalidInput(f"--{name} is for {other}; name one, or leave the option out")
 
     def _menu(self) -> Menu:
+        from ..compare import Results
+        from ..errors import FileProblem
+        from ..viz import library_menu
+        from ..viz.scenes import result_menu
+
         if self.what is not None and self.what.is_dir():
             self._refuse(("apex",), "a gait library")
             return result_menu(

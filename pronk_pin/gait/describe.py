@@ -40,7 +40,7 @@ def describe_library(library: GaitLibrary) -> str:
     times = library.metadata.get("solve_time", [])
     if times:
         lines += ["", f"{len(times)} gaits, solved in {sum(times):.1f} s"]
-    return "\n".join(lines)
+    return "\n".join([*lines, _verdict(library)])
 
 
 def describe_gait(
@@ -79,9 +79,23 @@ def describe_gait(
     k = next((i for i, other in enumerate(library.gaits) if other is gait), None)
     if k is None:
         lines.append("  interpolated between its neighbours (eq. 13); the audit is theirs")
+        lines += [_verdict(library)] if library.audit else []
     elif library.audit:
-        lines += ["", library.audit[k].table()]
+        failed = ", ".join(check.name for check in library.audit[k].failures)
+        lines += ["", library.audit[k].table(), ""]
+        lines.append(f"The gait fails: {failed}." if failed else "The gait passes all its checks.")
     return "\n".join(lines)
+
+
+def _verdict(library: GaitLibrary) -> str:
+    """Whether all gaits of a library pass their audits, in one line."""
+    failed = [
+        gait for gait, audit in zip(library.gaits, library.audit, strict=True) if audit.failures
+    ]
+    if not failed:
+        return f"All {len(library.gaits)} gaits pass all their checks."
+    which = ", ".join(f"{gait.speed:+.2f} m/s at {gait.apex:.3f} m" for gait in failed)
+    return f"{len(failed)} of {len(library.gaits)} gaits fail: {which}."
 
 
 def _why(losses: Sequence[Any], order: int) -> str:

@@ -153,7 +153,10 @@ class GaitLibrary(Displayed):
             InvalidInput: There is no such apex; the error lists the grid.
         """
         height = self.apex if apex is None else real("apex", apex)
-        n, row = len(self.speeds), _index(self.apexes, height, "apex")
+        between = self.apexes[0] < height < self.apexes[-1]
+        single = f"'pronk-pin gaits show SPEED --apex {height:g}' interpolates a single gait"
+        row = _index(self.apexes, height, "apex", f"; {single}" if between else "")
+        n = len(self.speeds)
         part = slice(row * n, (row + 1) * n)
         metadata = {
             key: value[part] if key in PER_GAIT else value for key, value in self.metadata.items()
@@ -410,11 +413,11 @@ def _distinct(values: Iterable[float]) -> Array:
     return ordered[np.concatenate([[True], np.diff(ordered) > _SAME])] if ordered.size else ordered
 
 
-def _index(grid: Array, value: float, name: str) -> int:
+def _index(grid: Array, value: float, name: str, else_: str = "") -> int:
     nearest = int(np.argmin(np.abs(grid - value)))
     if not abs(grid[nearest] - value) < _SAME:
         listed = ", ".join(f"{v:g}" for v in grid)
-        raise InvalidInput(f"the library has no {name} {value:g}; choose one of: {listed}")
+        raise InvalidInput(f"the library has no {name} {value:g}; choose one of: {listed}{else_}")
     return nearest
 
 

@@ -97,8 +97,8 @@ def test_a_picture_that_fails_does_not_fail_a_finished_comparison(
     def fail(*_: object, **__: object) -> None:
         raise RuntimeError("of a library that draws")
 
-    for name in ("write_report", "write_replay"):
-        monkeypatch.setattr(f"pronk_pin.cli.comparison.{name}", fail)
+    for name in ("report.write_report", "write_replay"):
+        monkeypatch.setattr(f"pronk_pin.viz.{name}", fail)
     controllers = ["--controllers", "pd", "ilc", "library"]
     assert main(["compare", *SHORT, *controllers, "--folder", str(result), "--workers", "1"]) == 0
     output = capsys.readouterr().out

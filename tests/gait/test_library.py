@@ -318,8 +318,31 @@ def test_nothing_to_build_or_to_describe_is_refused(library: GaitLibrary, robot:
 
 def test_descriptions_show_every_gait(library: GaitLibrary) -> None:
     table = describe_library(library)
-    assert len(table.splitlines()) == 2 + len(library.gaits) + 2
+    assert len(table.splitlines()) == 2 + len(library.gaits) + 3
+    assert table.endswith("\nAll 14 gaits pass all their checks.")
     assert "14 gaits, solved in" in table
     assert "FAILED" not in table
     assert "18-DoF residual" in describe_gait(library, 0.3)
+    assert describe_gait(library, 0.3).endswith("\nThe gait passes all its checks.")
     assert "interpolated" in describe_gait(library, 0.35)
+
+
+def test_descriptions_end_with_what_fails(library: GaitLibrary) -> None:
+    good, *others = library.audit
+    wrong = dataclasses.replace(good.checks[0], value=np.inf)
+    failed = dataclasses.replace(good, checks=(wrong, *good.checks[1:]))
+    library = GaitLibrary(library.gaits, library.metadata, (failed, *others))
+    speed, apex = library.gaits[0].speed, library.gaits[0].apex
+    verdict = f"1 of 14 gaits fail: {speed:+.2f} m/s at {apex:.3f} m."
+    assert describe_library(library).splitlines()[-1] == verdict
+    assert describe_gait(library, speed).endswith(f"\nThe gait fails: {wrong.name}.")
+    assert describe_gait(library, 0.35).endswith(f"\n{verdict}")
+
+
+def test_an_apex_between_two_is_no_part_of_a_library_but_can_be_interpolated() -> None:
+    library = load_library("a1")
+    with pytest.raises(InvalidInput, match=r"gaits show SPEED --apex 0\.33' interpolates"):
+        library.at_apex(0.33)
+    with pytest.raises(InvalidInput, match=r"choose one of: 0\.32, 0\.34, 0\.36$"):
+        library.at_apex(0.5)
+    assert library.at(0.3, 0.33).apex == pytest.approx(0.33)

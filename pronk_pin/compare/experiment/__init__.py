@@ -7,6 +7,7 @@ Goes out: an `Experiment`, its cells and their definition, and the strides of a 
 from .cell import run_cell
 from .definition import Definition, cell_definition, define, differences, fingerprint
 from .description import describe
+from .entries import name_of
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment
 from .experiment_file import GAITS, from_document, read_config, to_document
 from .initial_feedforward import LIBRARY_VARIABLES, initial_feedforward, torque_library
@@ -28,6 +29,7 @@ __all__ = [
     "from_document",
     "initial_feedforward",
     "load_suite",
+    "name_of",
     "read_config",
     "run_cell",
     "to_document",

@@ -5,35 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from tyro.constructors import PrimitiveConstructorSpec
-
 from ...errors import InvalidInput
 from ...gait import GaitLibrary
 from .description import describe
 
 _T = TypeVar("_T")
-
-
-def by_name(metavar: str) -> PrimitiveConstructorSpec[Any]:
-    """Option of the command line for what may be an object: it takes and shows the name."""
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar=metavar,
-        instance_from_str=lambda words: words[0],
-        is_instance=lambda value: True,
-        str_from_instance=lambda value: [name_of(value)],
-    )
-
-
-def by_names(metavar: str) -> PrimitiveConstructorSpec[Any]:
-    """Option of the command line for several of these."""
-    return PrimitiveConstructorSpec(
-        nargs="*",
-        metavar=metavar,
-        instance_from_str=lambda words: tuple(words),
-        is_instance=lambda value: True,
-        str_from_instance=lambda values: [name_of(value) for value in values],
-    )
 
 
 def name_of(value: Any) -> str:

@@ -10,9 +10,7 @@ import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
-
-from tyro.conf import Suppress
+from typing import Any
 
 from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
 from ..._display import Displayed, listed, spanned
@@ -41,7 +39,7 @@ from ..metrics import Metric, load_metric
 from ..simulation import Schedule
 from ..world import Scenario, load_scenario, shipped_scenario
 from .description import describe
-from .entries import by_name, by_names, digest_of, name_of, named, shortest
+from .entries import digest_of, name_of, named, shortest
 
 LEARNED = ("library", "identified")
 """Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
@@ -57,13 +55,6 @@ def default_controllers(robot: Robot) -> tuple[str, ...]:
     known = bool(robot.spec.rotors)
     specs = [CONTROLLERS[name] for name in DEFAULT_CONTROLLERS]
     return tuple(spec.name for spec in specs if known or spec.gait_model != "datasheet")
-
-
-Controllers: TypeAlias = Annotated[
-    tuple[str | ControllerSpec, ...], by_names("[NAME|MODULE:OBJECT [...]]")
-]
-Metrics: TypeAlias = Annotated[tuple[str | Metric, ...], by_names("[MODULE:OBJECT [...]]")]
-Scenarios: TypeAlias = Annotated[tuple[str | Scenario, ...], by_names("[NAME|MODULE:OBJECT [...]]")]
 
 
 @dataclass(frozen=True, repr=False)
@@ -97,18 +88,18 @@ class Experiment(Displayed):
             results folder; empty for all at once.
     """
 
-    robot: Annotated[str | RobotSpec, by_name("NAME|FILE|MODULE:OBJECT")] = "a1"
-    gaits: Annotated[str | GaitLibrary, by_name("NAME|FILE")] = "pronk"
+    robot: str | RobotSpec = "a1"
+    gaits: str | GaitLibrary = "pronk"
     apex: float | None = None
     speeds: tuple[float, ...] = ()
-    controllers: Controllers = ()
-    scenarios: Scenarios = ("nominal",)
+    controllers: tuple[str | ControllerSpec, ...] = ()
+    scenarios: tuple[str | Scenario, ...] = ("nominal",)
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
     mjcf: str = ""
     schedule: Schedule = field(default_factory=Schedule)
-    metrics: Metrics = ()
-    batches: Annotated[tuple[tuple[float, ...], ...], Suppress] = ()
+    metrics: tuple[str | Metric, ...] = ()
+    batches: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         keep = object.__setattr__

@@ -34,7 +34,10 @@ def unsaid(tables: Mapping[str, Overview]) -> str:
     controllers = {name for table in tables.values() for name in table}
     needed = ["pd", LEARNER, "model"] if len(tables) > 1 else ["pd", LEARNER]
     missing = [name for name in needed if name not in controllers]
-    return f"There is no verdict: it takes {' and '.join(missing)}, which did not run."
+    return (
+        f"There is no verdict: it takes {' and '.join(missing)}, which did not run. Run again with "
+        f"'--controllers {' '.join(missing)}' and the same --folder: what is there stays."
+    )
 
 
 def _untaught(summary: pd.DataFrame) -> str:

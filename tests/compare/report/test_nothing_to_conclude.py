@@ -229,6 +229,8 @@ def test_what_was_not_run_is_named(summary: pd.DataFrame, missing: list[str], sp
     needed = [name for name in missing if name != "model"]
     said = f"There is no verdict: it takes {' and '.join(needed)}, which did not run."
     assert (said in " ".join(text.split())) == bool(needed)
+    remedy = f"Run again with '--controllers {' '.join(needed)}' and the same --folder"
+    assert (remedy in " ".join(text.split())) == bool(needed)
     check_words(format_suite(pd.concat([some, some.assign(scenario="slope")])))
 
 

@@ -103,7 +103,7 @@ def test_the_command_explains_and_closes_the_loop(
             **options,  # type: ignore[arg-type]
         )
 
-    monkeypatch.setattr("pronk_pin.cli.comparison.close_loop", closed)
+    monkeypatch.setattr("pronk_pin.compare.studies.close_loop", closed)
     assert main(["explain", str(results.folder), "--close-loop", "--draws", "2"]) == 0
     assert "identified" in capsys.readouterr().out
     assert [gait.apex for gait in seen[0]] == [0.33]
