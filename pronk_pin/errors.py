@@ -180,12 +180,19 @@ class WorkerLost(PronkError):
 
     Attributes:
         folder: The folder that holds what was finished.
+        of_script: Whether they need a class or function of the main script.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, *, of_script: bool = False) -> None:
+        self.folder, self.of_script = folder, of_script
+        why = "for want of memory perhaps"
+        if of_script:
+            why += (
+                ", or because they did not find a class or function of the script, which must "
+                "stand in its file above `if __name__ == '__main__'`, or in a module"
+            )
         super().__init__(
-            "workers ended unexpectedly, for want of memory perhaps; what was finished is kept: "
+            f"workers ended unexpectedly, {why}; what was finished is kept: "
             f"run the same command again with '--folder {folder} --workers 1' to complete it"
         )
 

@@ -6,6 +6,7 @@ file as bytes, so that they may sit on other machines and be killed at any momen
 
 from __future__ import annotations
 
+import pickle
 import sys
 import threading
 import time
@@ -239,7 +240,8 @@ class _Run:
                     reason = error
                     if pool.steps is not None and (script := unguarded_script()):
                         raise NoMainGuard(script) from error
-        raise WorkerLost(self.results.folder) from reason
+        of_script = b"__main__" in pickle.dumps(cells)
+        raise WorkerLost(self.results.folder, of_script=of_script) from reason
 
     def _play(self, pool: WorkerPool, waiting: list[Cell]) -> None:
         """Hand cells out and save what comes back; one waits for what it depends on."""

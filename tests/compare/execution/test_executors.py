@@ -155,6 +155,31 @@ def test_a_script_whose_main_code_is_not_guarded_is_told_so(name: str, tmp_path:
     assert not (tmp_path / "results").exists()
 
 
+def test_a_class_that_workers_do_not_find_in_the_script_is_named_as_a_cause(tmp_path: Path) -> None:
+    script = tmp_path / "mine.py"
+    script.write_text(
+        textwrap.dedent(
+            """
+            if __name__ == "__main__":
+                from pronk_pin.compare import Experiment, Schedule, run_experiment
+                from pronk_pin.control import ControllerSpec
+                class Law:
+                    def update(self, record):
+                        return record.feedforward
+                short = Schedule(baseline=0.5, learning=0.5)
+                mine = ControllerSpec("mine", law=Law())
+                made = Experiment(speeds=(0.0,), controllers=("pd", mine), schedule=short)
+                run_experiment(made, "results", workers=2, progress=False)
+            """
+        )
+    )
+    ended = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 1
+    assert "did not find a class or function of the script" in ended.stderr.splitlines()[-1]
+
+
 class Inline(Executor):
     """Does the work at once, in this process."""
 
