@@ -239,7 +239,8 @@ class Explain:
     """Write the identified model to this MJCF; by default it is not written."""
     close_loop: bool = False
     """Try the identified model, with its gaits optimised again, beside the model, the torque
-    library and learning, at speeds halfway between those of the result and with 3 kg more."""
+    library and learning, at speeds halfway between those of the result, and with 3 kg more
+    on the A1 (others: the same share of their mass)."""
     imu_noise: float = 0.0
     """Standard deviation of noise added to the trunk's acceleration [m/s^2]."""
     draws: int = 300

@@ -101,9 +101,11 @@ def leg_geometry(robot: Robot) -> LegGeometry:
             besides: the closed form does not hold.
     """
     if len(robot.spec.joints) != len(JOINTS) or robot.joint_names != robot.spec.joint_names:
+        others = [name for name in robot.joint_names if name not in robot.spec.joint_names]
+        remedy = f"; make those of no leg fixed in the URDF: {', '.join(others)}" if others else ""
         raise InvalidInput(
             f"{robot.name}: closed-form leg kinematics needs legs of three joints and no others, "
-            f"not {', '.join(robot.joint_names)}"
+            f"not {', '.join(robot.joint_names)}{remedy}"
         )
     legs = [leg_frames(robot, leg) for leg in robot.legs]
     sense = np.empty((len(legs), len(JOINTS)))

@@ -296,7 +296,7 @@ def locate(urdf: str) -> tuple[Path, Path]:
     """
     path, data = Path(urdf).expanduser(), _data_folder()
     if path.is_absolute():
-        check_file(path, "check the path in the RobotSpec")
+        check_file(path, "put it back, or check the path in the RobotSpec")
         return path, data or path.parent
     wanted = Path("example-robot-data", "robots", urdf)
     if data is None or not _is_file(data / wanted):

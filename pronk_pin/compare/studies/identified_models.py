@@ -19,6 +19,7 @@ from ..._typing import Array
 from ...control import load_controller
 from ...errors import InvalidInput
 from ...gait import Gait, load_library, replan
+from ...robot import Robot, load_robot
 from ..experiment import initial_feedforward
 from ..identification import Explanation
 from ..metrics import by_joint
@@ -29,6 +30,8 @@ CONTROLLERS = ("model", "library", "ilc", "identified", "identified+gait")
 """Controllers that are compared."""
 STRIDES = 10
 """Strides at the end that count."""
+_MORE = 3.0
+"""What the A1 carries more in the second world [kg]; others carry the same share of their mass."""
 SCHEDULE = Schedule(baseline=6.0, learning=12.0)
 """By default; controllers that do not learn make the first part only."""
 
@@ -51,8 +54,8 @@ def close_loop(
         explanation: What learning found.
         strides: The strides that it was found in; the torque library comes from them.
         speeds: Speeds [m/s]; by default those halfway between the learned ones.
-        scenarios: Worlds; by default the one of the strides, and one with 3 kg more, which the
-            model was not identified in.
+        scenarios: Worlds; by default the one of the strides, and one with 3 kg more on the A1, of
+            others the same share of their mass, which the model was not identified in.
         controllers: What is compared.
         schedule: What happens when; the law is on in its second part, whatever the speeds.
         planned_at: Gives the planned gaits at some speeds, as `Experiment.planned_at` does; by
@@ -73,7 +76,7 @@ def close_loop(
     seed = int(rng.integers(2**31))
     learned_speeds = strides["speed"].to_numpy()
     speeds = tuple(_between(learned_speeds) if speeds is None else speeds)
-    scenarios_ = _scenarios(strides, scenarios)
+    scenarios_ = _scenarios(explanation.robot, strides, scenarios)
     if planned_at is None:
         library = load_library(explanation.robot.name)
         gaits = [library.at(speed) for speed in speeds]
@@ -133,7 +136,9 @@ def _between(speeds: Array) -> Array:
     return np.asarray((speeds[1:] + speeds[:-1]) / 2.0)
 
 
-def _scenarios(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) -> list[Scenario]:
+def _scenarios(
+    robot: Robot, strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None
+) -> list[Scenario]:
     if scenarios is not None:
         return [
             load_scenario(scenario) if isinstance(scenario, str) else scenario
@@ -145,7 +150,9 @@ def _scenarios(strides: xr.Dataset, scenarios: Sequence[Scenario | str] | None) 
         raise InvalidInput(
             "these strides do not tell the world they were made in; give the scenarios"
         ) from error
-    return [own, replace(own, name=f"{own.name}+3kg", payload=own.payload + 3.0)]
+    share = (robot.bare or robot).mass / load_robot("a1").mass
+    more = float(f"{_MORE * share:.2g}")
+    return [own, replace(own, name=f"{own.name}+{more:g}kg", payload=own.payload + more)]
 
 
 def _rows(scenario: str, controller: str, strides: xr.Dataset) -> list[dict[str, object]]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
 from pronk_pin._typing import Array
 from pronk_pin.cli import main
@@ -18,9 +19,10 @@ from pronk_pin.compare import (
     run_experiment,
 )
 from pronk_pin.compare.studies import close_loop
+from pronk_pin.compare.studies.identified_models import _scenarios
 from pronk_pin.control import ControllerSpec, LawContext, LearningLaw, PDTypeILC, StrideRecord
 from pronk_pin.gait import Gait, GaitLibrary
-from pronk_pin.robot import ROBOTS
+from pronk_pin.robot import ROBOTS, load_robot
 
 WORN = Scenario("worn", armature=0.01, damping=0.1, coulomb=(0.2, 0.3, 0.4))
 SCHEDULE = Schedule(startup=0.2, baseline=1.5, learning=3.0)
@@ -107,3 +109,15 @@ def test_the_command_explains_and_closes_the_loop(
     assert main(["explain", str(results.folder), "--close-loop", "--draws", "2"]) == 0
     assert "identified" in capsys.readouterr().out
     assert [gait.apex for gait in seen[0]] == [0.33]
+
+
+@pytest.mark.parametrize(
+    ("name", "load"), [("a1", 3.0), ("bolt", 0.27), ("hyq", 19.0)], ids=["a1", "bolt", "hyq"]
+)
+def test_the_loop_is_closed_under_a_load_that_is_the_same_share_of_each_robot(
+    name: str, load: float
+) -> None:
+    strides = xr.Dataset(attrs={"scenario_parameters": WORN.to_json()})
+    own, loaded = _scenarios(load_robot(name), strides, None)
+    assert own == WORN
+    assert (loaded.name, loaded.payload) == (f"worn+{load:g}kg", load)
