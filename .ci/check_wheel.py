@@ -12,6 +12,7 @@ from pronk_pin.gait import load_library
 NEEDED = {
     "pronk_pin/py.typed",
     "pronk_pin/gait/data/a1.npz",
+    "pronk_pin/robot/specs/a1.toml",
     "pronk_pin/compare/metrics/data/paper_table1.csv",
     "pronk_pin/viz/player/data/page.html",
 }

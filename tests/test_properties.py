@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -21,7 +21,7 @@ SOME = settings(max_examples=40, deadline=None, suppress_health_check=list(Healt
 
 NAMES = st.sampled_from(sorted(ROBOTS))
 
-# What each function takes, in its order; q is (19,), v and a are (18,), tau and joints (12,).
+# What each function takes, in its order; q is (nq,), v and a are (nv,), tau and joints (nu,).
 FUNCTIONS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
     "mass_matrix": (dynamics.mass_matrix, ("q",)),
     "coriolis_matrix": (dynamics.coriolis_matrix, ("q", "v")),
@@ -81,8 +81,13 @@ def states(draw: st.DrawFn) -> tuple[str, dict[str, Array]]:
     share = draw(hnp.arrays(float, robot.nu, elements=st.floats(0.0, 1.0)))
     joints = robot.q_min + share * (robot.q_max - robot.q_min)
     q = np.concatenate([draw(numbers(3, 10.0)), quaternion / np.linalg.norm(quaternion), joints])
-    vectors = {"v": numbers(18, 20.0), "a": numbers(18, 100.0), "tau": numbers(12, 40.0)}
+    nv, nu = robot.nv, robot.nu
+    vectors = {"v": numbers(nv, 20.0), "a": numbers(nv, 100.0), "tau": numbers(nu, 40.0)}
     return name, {"q": q} | {key: draw(strategy) for key, strategy in vectors.items()}
+
+
+def has_an_order_of_the_paper(name: str) -> bool:
+    return len(load_robot(name).legs) == 4
 
 
 def leaves(result: Any) -> list[Array]:
@@ -96,6 +101,7 @@ def leaves(result: Any) -> list[Array]:
 def test_every_state_has_a_finite_answer(function: str, state: tuple[str, dict[str, Any]]) -> None:
     name, arrays = state
     call, needs = FUNCTIONS[function]
+    assume(has_an_order_of_the_paper(name) or not function.endswith("paper"))
     result = call(load_robot(name), *(arrays[key] for key in needs))
     assert all(np.isfinite(part).all() for part in leaves(result))
 
@@ -106,6 +112,7 @@ def test_every_state_has_a_finite_answer(function: str, state: tuple[str, dict[s
 def test_a_batch_is_its_rows(function: str, first: tuple[str, dict[str, Any]], seed: int) -> None:
     name, arrays = first
     robot, (call, needs) = load_robot(name), FUNCTIONS[function]
+    assume(has_an_order_of_the_paper(name) or not function.endswith("paper"))
     rng = np.random.default_rng(seed)
     other = {key: x * rng.uniform(0.5, 1.0) for key, x in arrays.items()}
     other["q"] = robot.standing
@@ -126,6 +133,7 @@ def test_every_broken_state_is_refused_with_a_remedy(
 ) -> None:
     name, arrays = state
     call, needs = FUNCTIONS[function]
+    assume(has_an_order_of_the_paper(name) or not function.endswith("paper"))
     which = data.draw(st.sampled_from(needs))
     broken = np.array(arrays[which])
     how = data.draw(st.sampled_from(["nan", "inf", "short", "long", "deep", "words", "norm"]))
@@ -163,6 +171,8 @@ def test_conversions_lose_nothing(state: tuple[str, dict[str, Any]]) -> None:
     for before, after in zip(arrays.values(), back, strict=True):
         scale = max(1.0, float(np.abs(before).max()), float(np.abs(arrays["v"]).max()) ** 2)
         np.testing.assert_allclose(after, before, rtol=0, atol=1e-14 * scale)
+    if not has_an_order_of_the_paper(name):
+        return
     tau = arrays["tau"]
     mine = conventions.from_paper(robot, conventions.to_paper(robot, tau))
     np.testing.assert_array_equal(mine, tau)

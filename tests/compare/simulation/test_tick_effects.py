@@ -169,13 +169,13 @@ def test_the_accelerometer_integrates_to_the_change_of_speed(build: Build, robot
     simulation = build(load_scenario("nominal"), controller="ilc-imu")
     liftoff, found = simulation.controller.liftoff, []
 
-    def spy(rows, log):  # type: ignore[no-untyped-def]
+    def spy(rows, log, commanded):  # type: ignore[no-untyped-def]
         rate = simulation.player.log.base_rate[rows]
         for row, length in enumerate(log.length):
             force = log.specific_force[row, : length - 1] - [0.0, 0.0, robot.gravity]
             gained = force.sum(axis=0)[[0, 2]] * 0.001
             found.append(gained - (rate[row, length - 1] - rate[row, 0]))
-        return liftoff(rows, log)
+        return liftoff(rows, log, commanded)
 
     simulation.controller.liftoff = spy  # type: ignore[method-assign]
     simulation.run()
