@@ -9,7 +9,7 @@ from .definition import Definition, cell_definition, define, differences, finger
 from .description import describe
 from .entries import name_of
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment
-from .experiment_file import GAITS, from_document, read_config, to_document
+from .experiment_file import GAITS, URDF, from_document, read_config, to_document
 from .initial_feedforward import LIBRARY_VARIABLES, initial_feedforward, torque_library
 from .suites import SUITES, load_suite
 
@@ -18,6 +18,7 @@ __all__ = [
     "GAITS",
     "LIBRARY_VARIABLES",
     "SUITES",
+    "URDF",
     "Cell",
     "Definition",
     "Experiment",

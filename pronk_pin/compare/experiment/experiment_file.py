@@ -23,8 +23,8 @@ from ..world import Scenario
 from .description import describe, restore
 from .experiment import Experiment
 
-GAITS = "gaits.npz"
-"""Name of the file of gaits beside a document, where they are not shipped."""
+GAITS, URDF = "gaits.npz", "robot.urdf"
+"""Files of gaits that are not shipped, and of a robot that is not, beside a document."""
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,19 @@ def from_document(document: object, path: Path, remedy: str) -> Experiment:
                 for k, value in enumerate(fields[name])
             )
     if isinstance(known.robot, dict):
-        fields["robot"] = restore(known.robot, RobotSpec, "robot")
+        fields["robot"] = _kept_robot(restore(known.robot, RobotSpec, "robot"), path.parent)
     for name in ("robot", "gaits", "mjcf"):
         value = fields.get(name)
         if isinstance(value, str) and value and (path.parent / value).is_file():
             fields[name] = str(path.parent / value)
     return Experiment(**fields)
+
+
+def _kept_robot(spec: RobotSpec, folder: Path) -> RobotSpec:
+    """A robot of one's own; where its URDF is gone, with the copy in a results folder."""
+    kept = folder / URDF
+    gone = Path(spec.urdf).is_absolute() and not Path(spec.urdf).is_file()
+    return dataclasses.replace(spec, urdf=str(kept.resolve())) if gone and kept.is_file() else spec
 
 
 def read_config(path: Path | str) -> Experiment:

@@ -10,7 +10,7 @@ from pathlib import Path
 from ..._checks import file_name
 from ...errors import FileProblem, OtherMachine, cannot_write
 from ...storage import read_text
-from ..experiment import GAITS, Definition, define, differences
+from ..experiment import GAITS, URDF, Definition, define, differences
 from ..world import ForeignRobot, mjcf_sha256
 from .config_file import CONFIG, config_text, read_definition
 from .manifest import MANIFEST
@@ -57,6 +57,8 @@ def make_folder(results: Results, *, resimulate: bool = False) -> None:
         raise cannot_write(folder, error, "choose a folder of yours with --folder") from error
     if not isinstance(experiment.gaits, str):
         experiment.gaits.save(folder / GAITS)
+    if not isinstance(experiment.robot, str):
+        results.write(URDF, experiment.model.urdf)
     if foreign is not None:
         results.manifest.write(PARITY, foreign.to_json())
     config = config_text(experiment, definition)
@@ -120,7 +122,7 @@ def remove_if_empty(folder: Path) -> None:
     with contextlib.suppress(OSError):
         if any((folder / "strides").iterdir()):
             return
-        for name in (CONFIG, GAITS, MANIFEST, PARITY, PROVENANCE, SUMMARY):
+        for name in (CONFIG, GAITS, URDF, MANIFEST, PARITY, PROVENANCE, SUMMARY):
             (folder / name).unlink(missing_ok=True)
         (folder / "strides").rmdir()
         folder.rmdir()

@@ -5,6 +5,7 @@ file                   contents
 =====================  ==================================================================
 config.json            the experiment and its definition: who has it can make the rest again
 gaits.npz              its gaits, where they are not shipped (`Experiment.gaits`)
+robot.urdf             its robot, where that is one of your own: for when yours is gone
 manifest.json          SHA-256 of the strides, the summary and parity.json
 strides/<cell>.nc      every stride of one simulation (NetCDF-4), see `compare.simulation.dataset`
 summary.csv            one long table, see `compare.metrics`
@@ -34,6 +35,7 @@ from ..._checks import instance_of
 from ..._checks import path as known_path
 from ..._display import Displayed
 from ...errors import FileProblem, InvalidInput
+from ...robot import robot_attributes
 from ...storage import read_bytes, reading, sealed, sha256, write_file
 from ..experiment import Cell, Definition, Experiment, cell_definition, define, describe
 from ..metrics import join_summaries, summarize_cell
@@ -224,6 +226,8 @@ class Results(Displayed):
         """
         with self._open(cell) as file, reading(self.path(cell), make_anew(self.folder)):
             wanted = file if variables is None else file[[v for v in variables if v in file]]
+            # Its URDF may lie elsewhere than it did.
+            wanted.attrs.update(robot_attributes(self.experiment.model.spec))
             return wanted.load()
 
     def all_strides(self, *, controller: str, scenario: str | None = None) -> xr.Dataset:

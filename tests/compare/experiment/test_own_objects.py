@@ -387,13 +387,16 @@ def test_scenarios_are_added() -> None:
 def test_gaits_and_robots_of_ones_own(
     twin: GaitLibrary, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A robot from TOML with the A1's URDF, and gaits of that name, end to end from the shell."""
-    spec = ROBOTS["a1"]
+    """A robot from TOML with the A1's URDF, and gaits of that name, end to end from the shell; what
+    was made of it needs none of the three files any more."""
+    spec, urdf = ROBOTS["a1"], tmp_path / "twin.urdf"
+    urdf.write_bytes(load_robot().urdf)
     shipped = resources.files("pronk_pin.robot") / "specs" / "a1.toml"
     text = shipped.read_text().replace('name = "a1"', 'name = "twin"')
+    text = text.replace(spec.urdf, urdf.name)
     (tmp_path / "robot.toml").write_text(text)
     robot = RobotSpec.load(tmp_path / "robot.toml")
-    assert robot == replace(spec, name="twin")
+    assert robot == replace(spec, name="twin", urdf=str(urdf))
     with pytest.raises(FileProblem, match="no such gait library is shipped"):
         Experiment(robot=robot)
     with pytest.raises(InvalidInput, match="gaits of a1, and the robot is twin"):
@@ -415,13 +418,16 @@ def test_gaits_and_robots_of_ones_own(
     assert cli.main(["gaits", "show", "0.3", *library]) == 1
     assert "known by name; give its file, --robot FILE.toml" in capsys.readouterr().err
     path.unlink()
-    (tmp_path / "robot.toml").unlink()  # the folder has all it needs
+    for file in (tmp_path / "robot.toml", urdf):  # the folder has all it needs
+        file.unlink()
     results = Results.load(tmp_path / "result")
-    assert results.experiment.robot == robot
+    assert results.experiment.robot == replace(robot, urdf=str(tmp_path / "result" / "robot.urdf"))
     assert results.experiment.apex == 0.33
     assert results.experiment.library == twin
     assert define(results.experiment)["gaits"]["0.3"] == twin.at(0.3, 0.33).sha256
     assert cli.main(["report", str(tmp_path / "result")]) == 0
+    more = ("--scenarios", "nominal", "ideal", "--workers", "1")
+    assert cli.main(["compare", "--folder", str(tmp_path / "result"), *more]) == 0
     # The same gait and URDF under another name: the same strides as the A1's.
     other = Experiment(
         apex=0.33, speeds=(0.3,), controllers=("pd",), schedule=results.experiment.schedule
