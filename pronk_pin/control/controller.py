@@ -213,14 +213,16 @@ class Controller:
             late: Ticks ago that they touched down; by default those of the specification.
         """
         usable = self.skipped[rows] == 0
-        before = Memory(self.feedforward[rows], self._flight.duration[rows])
+        command = self._command
+        before = None if command is None else self._memory_of(rows)
         learns = np.zeros(len(rows), dtype=bool)
         if learning is not None:
             learns = usable & learning
             learns[learning] &= ~self._roll_back(rows[learning], usable[learning])
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
-        self._change_stances(rows, before)
+        if command is not None and before is not None:
+            self._change_stances(command, rows, before)
         reference, position = self._stance, self._stance.position[rows]
         acceleration, phase = self._of_the_tick(reference, rows, slice(None))
         return Tape(
@@ -260,12 +262,9 @@ class Controller:
         for row, gait in zip(rows, change.gaits, strict=True):
             self._landing_gaits[row] = gait
 
-    def _change_stances(self, rows: IntArray, before: Memory) -> None:
+    def _change_stances(self, command: SpeedCommand, rows: IntArray, before: Memory) -> None:
         """Stand in the gaits that were flown to, after what came on top of the torques and timings
         `before` was stored."""
-        command = self._command
-        if command is None:
-            return
         memory, landed = command.memory, command.speed[rows]
         learned = self.feedforward[rows] - before.feedforward
         memory.teach(rows, self._standing_speed[rows], 0, learned[:, 0])
@@ -450,12 +449,17 @@ class Controller:
         if self.guard is None:
             return np.zeros(len(rows), dtype=bool)
         squares = [np.mean(last.error[rows] ** 2, axis=(1, 2)) for last in self._last]
-        played = Memory(self.feedforward[rows], self._flight.duration[rows])
-        back = self.guard.judge(rows, usable, np.sqrt(np.mean(squares, axis=0)), played)
+        back = self.guard.judge(
+            rows, usable, np.sqrt(np.mean(squares, axis=0)), self._memory_of(rows)
+        )
         who = rows[back]
         self.feedforward[who] = self.guard.best.feedforward[who]
         self._flight.stretch(who, self.guard.best.flight[who])
         return back
+
+    def _memory_of(self, rows: IntArray) -> Memory:
+        """What some robots play, copied."""
+        return Memory(self.feedforward[rows], self._flight.duration[rows])
 
     def _learn(self, rows: IntArray) -> None:
         """Update the feedforward of some robots from their last stride."""

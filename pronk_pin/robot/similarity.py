@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..errors import InvalidInput
-from .robot import Robot, load_robot
+from .robot import JOINTS, Robot, load_robot
 
 Leg = tuple[float, float, float]
 """A value for each joint of a leg: hip, thigh, calf."""
@@ -42,7 +42,7 @@ def size(robot: Robot) -> Size:
     Raises:
         InvalidInput: It has no legs of three joints.
     """
-    if len(robot.spec.joints) != len(Leg.__args__):  # type: ignore[attr-defined]
+    if len(robot.spec.joints) != len(JOINTS):
         raise InvalidInput(
             f"{robot.name} has legs of {len(robot.spec.joints)} joints; what its RobotSpec leaves "
             "out is scaled for hip, thigh and calf only: give kp, kd and apex there"
