@@ -1,17 +1,21 @@
 # make compare   run the comparison of the paper, print the table, write report and replay
 # make test      run the tests
-# Both create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
+# make mutants   put faults into the package one at a time, and see whether tests notice: hours
+# All create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
 PYTHON ?= python3
 BIN := .venv/bin
 ARGS ?=
 
-.PHONY: compare test lint clean
+.PHONY: compare test mutants lint clean
 
 compare: .venv/.installed
 	$(BIN)/pronk-pin compare $(ARGS)
 
 test: .venv/.installed-test
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal $(ARGS)
+
+mutants: .venv/.installed-test
+	$(BIN)/python benchmarks/mutants.py $(ARGS)
 
 lint: .venv/.installed-dev
 	$(BIN)/ruff check .

@@ -24,6 +24,7 @@ from pronk_pin.cli.ilc import Analyze, Drive, Gains, Seeding, Stability, Transfe
 from pronk_pin.cli.parity import Parity
 from pronk_pin.cli.view import FilmOptions, View
 from pronk_pin.compare import Experiment, MujocoEngine, Results, Schedule, run_experiment
+from pronk_pin.compare.experiment import load_suite
 from pronk_pin.gait import load_library
 
 Arguments = dict[str, Any]
@@ -385,6 +386,17 @@ def test_an_option_of_reproduce_reaches_the_run(
     assert case.found(arguments(["reproduce"], target)) != case.value
     assert asked(given).controller_names[0] == "pd"
     assert options_of(Reproduce) == {"folder", "seeds", "workers"}
+
+
+def test_what_is_reproduced_are_the_learners_of_the_suite(
+    tmp_path: Path, arguments: Callable[..., Arguments], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pronk_pin.compare.run_experiment", lambda *_, **__: "results")
+    given = arguments(["reproduce", "--folder", str(tmp_path)], STUDY + "format_reproduction")
+    assert given["results"] == "results"
+    names = load_suite("paper").controller_names
+    assert "pd" in names
+    assert set(given["learners"]) == {*names} - {"pd"}
 
 
 def drawn(given: Arguments) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 
@@ -16,7 +17,7 @@ from pronk_pin._typing import Array
 from pronk_pin.compare.metrics import Interval
 from pronk_pin.compare.report import SHOWN, Overview
 from pronk_pin.compare.report.overview import Beat, ControllerOverview, JointOverview
-from pronk_pin.robot import JOINTS
+from pronk_pin.robot import JOINTS, load_robot
 from pronk_pin.viz.figure_style import look
 from pronk_pin.viz.figures import (
     by_scenario,
@@ -27,6 +28,7 @@ from pronk_pin.viz.figures import (
     predicted_and_measured,
     shows_knowledge,
 )
+from pronk_pin.viz.figures.explanation_figure import explanation_figure
 
 
 def curve(axes: Axes, label: str) -> Array:
@@ -238,3 +240,71 @@ def test_each_sampled_world_has_its_line_with_all_controllers() -> None:
 
 def ticks(axes: Axes) -> Sequence[str]:
     return [label.get_text() for label in axes.get_yticklabels()]
+
+
+def explanation_of(torques: Array, table: pd.DataFrame) -> Any:
+    """What the figure reads of an explanation: torques by cause, and parameters."""
+    causes = ["armature", "load", "unexplained"]
+    joints = load_robot("a1").joint_coordinates
+    dims = ("speed", "cause", "part", "phase", "joint")
+    whole = torques.sum(axis=1)
+    shares = xr.Dataset(
+        {
+            "torque": (dims, torques),
+            "learned": (("speed", "part", "phase", "joint"), 2.0 + whole),
+            "model": (("speed", "part", "phase", "joint"), np.full(whole.shape, 2.0)),
+            "duration": (("speed", "part"), np.full((2, 2), 0.2)),
+        },
+        coords={
+            "speed": [0.1, 0.6],
+            "cause": causes,
+            "part": ["stance", "flight"],
+            "phase": np.linspace(0.0, 1.0, 5),
+            **joints,
+        },
+    )
+    terms = [
+        SimpleNamespace(name=name, scale=scale, unit="kg") for name, scale in (("a", 0.5), ("b", 4))
+    ]
+    attributes = {"controller": "ilc", "scenario": "payload"}
+    return SimpleNamespace(shares=shares, terms=terms, table=lambda: table, attributes=attributes)
+
+
+def test_causes_are_stacked_to_what_was_learned_beyond_the_model() -> None:
+    torques = np.random.default_rng(2).normal(size=(2, 3, 2, 5, 12))
+    table = pd.DataFrame(
+        {
+            "estimate": [1.0, -2.0],
+            "low": [0.5, -3.0],
+            "high": [2.5, -1.5],
+            "true": [1.25, np.nan],
+            "seen": [True, False],
+        }
+    )
+    figure = explanation_figure(explanation_of(torques, table), speed=0.6)
+    assert "at 0.6 m/s" in figure.get_suptitle()
+    for place, joint in ((1, "thigh"), (2, "calf")):
+        for part, name in enumerate(("stance", "flight")):
+            (axes,) = (a for a in figure.axes if a.get_title() == f"FL_{joint}, {name}")
+            mine = torques[1, :, part, :, place]  # (causes, phases)
+            first = 1 if name == "stance" else 0  # feet bounce in the first 30 ms of a stance
+            drawn = curve(axes, "learned - model")[first:, 1]
+            np.testing.assert_allclose(drawn, mine.sum(axis=0)[first:])
+            bands = [path.vertices for each in axes.collections for path in each.get_paths()]
+            for k, phase in list(enumerate(np.linspace(0.0, 1.0, 5)))[first:]:
+                heights = np.concatenate([b[np.isclose(b[:, 0], phase), 1] for b in bands])
+                up, down = np.maximum(mine[:, k], 0.0).sum(), np.minimum(mine[:, k], 0.0).sum()
+                assert heights.max() == pytest.approx(up)
+                assert heights.min() == pytest.approx(down)
+    parameters = figure.axes[-1]
+    labels = [label.get_text() for label in parameters.get_yticklabels()]
+    assert labels == ["a [0.5 kg]", "b [4 kg]: not seen"]
+    (bars,) = (each for each in parameters.collections if len(each.get_paths()) == 2)
+    reach = [path.vertices[:, 0].tolist() for path in bars.get_paths()]
+    np.testing.assert_allclose(reach, [[1.0, 5.0], [-0.75, -0.375]])  # in units of the scales
+    (truth,) = (line for line in parameters.lines if line.get_label() == "truth")
+    np.testing.assert_allclose(np.asarray(truth.get_xdata(), float)[0], 2.5)
+    (points,) = (
+        line for line in parameters.lines if line.get_marker() == "o" and len(line.get_xdata())
+    )
+    np.testing.assert_allclose(np.column_stack(points.get_data()), [[2.0, 1.0], [-0.5, 0.0]])
