@@ -1,11 +1,12 @@
 # make compare   run the comparison of the paper, print the table, write report and replay
 # make test      run the tests
-# Both create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
+# make docs      build the documentation as a site, in site/
+# All create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
 PYTHON ?= python3
 BIN := .venv/bin
 ARGS ?=
 
-.PHONY: compare test lint clean
+.PHONY: compare test lint docs clean
 
 compare: .venv/.installed
 	$(BIN)/pronk-pin compare $(ARGS)
@@ -36,9 +37,16 @@ lint: .venv/.installed-dev
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	@touch $@
 
+.venv/.installed-docs: .venv/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
 .venv/.installed-dev: .venv/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
 
+docs: .venv/.installed-docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
 clean:
-	rm -rf .venv build dist *.egg-info
+	rm -rf .venv build dist site *.egg-info
