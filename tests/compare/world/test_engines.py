@@ -231,7 +231,10 @@ def test_momentum_is_kept_in_flight(engine: Engine, robot: Robot) -> None:
         q, v = states(motion)
         data = robot.model.createData()
         momentum = np.array(
-            [pin.computeCentroidalMomentum(robot.model, data, *at).vector for at in zip(q, v, strict=True)]
+            [
+                pin.computeCentroidalMomentum(robot.model, data, *at).vector
+                for at in zip(q, v, strict=True)
+            ]
         )
         momentum[:, 2] += robot.mass * robot.gravity * time
         errors.append(np.abs(momentum).max(axis=0))
@@ -254,7 +257,7 @@ def test_pose_and_twist_are_of_one_motion_in_the_trunks_axes(engine: Engine, rob
     torque[:, 40:] *= -0.5
     motion = play(world, torque)
     q, v = states(motion)
-    assert (np.abs(v[100, 3:6]) > 0.2).all()
+    assert (np.abs(v[:, 3:6]).max(axis=0) > 0.2).all()
     for before, after, rate in zip(q[:-1], q[1:], v[1:], strict=True):
         moved = pin.difference(robot.model, before, after)[:6] / DT
         np.testing.assert_allclose(moved[3:], rate[3:6], atol=2e-3 * np.abs(rate[3:6]).max() + 1e-9)
@@ -276,7 +279,9 @@ def test_a_push_gives_its_impulse_to_the_trunks_centre_of_mass(
     q, v = states(motion)
     model = loaded_model(robot, scenario)
     data = model.createData()
-    momentum = [pin.computeCentroidalMomentum(model, data, *at).vector for at in zip(q, v, strict=True)]
+    momentum = [
+        pin.computeCentroidalMomentum(model, data, *at).vector for at in zip(q, v, strict=True)
+    ]
     np.testing.assert_allclose(momentum[60], 0.0, atol=1e-6)
     np.testing.assert_allclose(momentum[81][:3], scenario.push_impulse, rtol=0.01, atol=0.01)
     # About the robot's centre of mass, as the trunk's is a little off it.
@@ -305,25 +310,26 @@ def test_a_foot_that_is_lifted_carries_nothing(engine: Engine, robot: Robot, leg
     assert ((world.force[0, :, 2] > 0.0) == (np.arange(4) != leg)).all()
 
 
-def test_feet_hold_below_the_friction_angle_and_slide_as_they_should_above(
+def test_feet_hold_within_their_friction_cones_and_slide_as_they_should_beyond(
     engine: Engine, robot: Robot
 ) -> None:
-    friction, seconds = 0.3, 0.3
-    for share in (0.95, 1.2):
+    """Below the friction angle and above it: the acceleration is g cos(slope) (tan(slope) - mu)."""
+    friction, ticks = 0.3, 300
+    for share in (0.8, 1.2):
         slope = np.arctan(share * friction)
         scenario = replace(IDEAL, ground_friction=friction, slope=slope)
         world = on_the_ground(engine, robot, scenario, seconds=0.3)
         before = world.base_rate[0, 0]
-        for _ in range(round(seconds / DT)):
-            world.step(held(robot, world))
-        acceleration = (world.base_rate[0, 0] - before) / seconds
-        sliding = -robot.gravity * np.cos(slope) * friction * (share - 1.0)
+        for _ in range(ticks):
+            force = world.step(held(robot, world)).force[0, 0]
+            pulled = np.linalg.norm(force[:, :2], axis=-1)
+            assert (pulled <= friction * force[:, 2] * (1.0 + 1e-3) + 1e-6).all()
         if share < 1.0:
-            assert abs(world.base_rate[0, 0]) < 2e-3
+            assert abs(world.base_rate[0, 0]) < 1e-3
         else:
-            assert acceleration == pytest.approx(sliding, rel=0.03)
-        pulled = np.linalg.norm(world.force[0, :, :2], axis=-1)
-        assert (pulled <= friction * world.force[0, :, 2] * (1.0 + 1e-3)).all()
+            sliding = -robot.gravity * np.cos(slope) * friction * (share - 1.0)
+            acceleration = (world.base_rate[0, 0] - before) / (ticks * DT)
+            assert acceleration == pytest.approx(sliding, rel=0.1)
 
 
 def test_a_force_acts_in_the_step_after_the_state_it_stands_beside(
@@ -343,7 +349,9 @@ def test_a_force_acts_in_the_step_after_the_state_it_stands_beside(
         mass = np.triu(mass) + np.triu(mass, 1).T
         needed = mass @ dv + pin.nonLinearEffects(robot.model, data, q, v)
         force = motion.force[0, 0].sum(axis=0)
-        np.testing.assert_allclose(force[[0, 2]], needed[[0, 2]], atol=1e-6 * robot.mass * 9.81 + 1e-4 * abs(force[2]))
+        np.testing.assert_allclose(
+            force[[0, 2]], needed[[0, 2]], atol=1e-6 * robot.mass * 9.81 + 1e-4 * abs(force[2])
+        )
         np.testing.assert_array_equal(world.force[rows], motion.force[:, 0])
         if first is None and force.any():
             first = tick
@@ -357,7 +365,9 @@ def test_what_is_played_and_thrown_away_has_not_happened(engine: Engine, robot: 
     rows = np.arange(2)
     before = [world.base.copy(), world.joints.copy(), world.joint_rates.copy(), world.force.copy()]
     thrown = world.play(rows, -torque)
-    for old, new in zip(before, (world.base, world.joints, world.joint_rates, world.force), strict=True):
+    for old, new in zip(
+        before, (world.base, world.joints, world.joint_rates, world.force), strict=True
+    ):
         np.testing.assert_array_equal(old, new)
     first, again = world.play(rows, torque), world.play(rows, torque)
     np.testing.assert_array_equal(first.joints, again.joints)
@@ -387,7 +397,7 @@ def test_robots_move_to_the_bit_as_each_alone_and_as_before(engine: Engine, robo
         return motion.base, motion.joints, motion.joint_rates, motion.force
 
     together = played([0, 1, 2])
-    assert together[3][..., 2].any(axis=1).all()  # all feet have met the ground
+    assert together[3][..., 2].any(axis=(1, 2)).all()  # each has met the ground
     for both, again in zip(together, played([0, 1, 2]), strict=True):
         np.testing.assert_array_equal(both, again)
     for row in range(3):
@@ -412,7 +422,7 @@ def test_servos_do_at_every_tick_what_feedback_would(
     motors.reset(place, joints)
     limited = False
     for tick in range(ticks):
-        np.testing.assert_allclose(motion.joints[0, tick], motors.joints[0], atol=1e-8)
+        np.testing.assert_allclose(motion.joints[0, tick], motors.joints[0], atol=1e-6)
         asked = gains.proportional(12) * (target - motors.joints)
         asked -= gains.derivative(12) * motors.joint_rates
         torque = np.clip(asked, -robot.tau_max, robot.tau_max)
@@ -427,17 +437,15 @@ def test_a_robot_that_breaks_is_told_and_put_back_and_harms_no_other(
     engine: Engine, robot: Robot, base: str
 ) -> None:
     world, alone = (in_the_air(engine, robot, IDEAL, n=n, base=base) for n in (2, 1))
-    torque = np.zeros((2, 5, 12))
-    torque[1, 2:] = 1e300
-    motion = play(world, torque)
-    assert motion.finite[0].all()
-    assert motion.finite[1].tolist() == [True, True, False, False, False]
-    again = play(world, np.zeros((2, 1, 12)))  # as it is, it raises nothing
-    assert again.finite[:, 0].tolist() == [True, False]
+    joints = np.tile(robot.standing[7:], (2, 1))
+    joints[1, 4] = np.nan
+    world.reset(np.tile([0.0, 1.0], (2, 1)), joints)
+    motion = play(world, np.zeros((2, 9, 12)))  # it raises nothing
+    assert motion.finite.tolist() == [[True] * 9, [False] * 9]
 
     world.restart(np.array([1]))
 
-    play(alone, np.zeros((1, 6, 12)))
+    play(alone, np.zeros((1, 9, 12)))
     np.testing.assert_array_equal(world.joints[1], robot.standing[7:])
     np.testing.assert_allclose(world.pose[1], robot.standing[:7], atol=1e-12)
     np.testing.assert_array_equal(world.joint_rates[1], 0.0)

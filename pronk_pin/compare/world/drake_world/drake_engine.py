@@ -13,25 +13,25 @@ from ....robot import BASES, Robot
 from ..engine import Engine, World
 from ..scenario import Scenario
 
-APPROXIMATIONS = ("sap", "lagged", "similar", "tamsi")
+APPROXIMATIONS = ("lagged", "similar", "sap")
 """Drake's approximations of the discrete contact problem."""
 
 
 @dataclass(frozen=True)
 class DrakeEngine(Engine):
-    """Drake: contacts by a convex problem (SAP) or a lagged one, dry friction, implicit damping.
+    """Drake: discrete steps with compliant contacts, dry friction in the joints, implicit damping.
 
     Attributes:
         name: Short name.
-        approximation: Of the discrete contact problem. "sap": convex, springs and dampers
-            (Castro, Permenter, Han 2022). "lagged" and "similar": Hunt and Crossley's contact in
-            convex problems (Castro, Han, Masterjohn 2024). "tamsi": the same, by Newton's method
-            with friction that slips below 1 mm/s (Castro et al. 2020); three times as fast, and
-            without dry friction in the joints.
+        approximation: Of the discrete contact problem, each of them convex. "lagged", Drake's own
+            default: Hunt and Crossley's contact, with friction that knows the normal force of the
+            step before. "similar": the same without that lag, but feet that slide are lifted a
+            little (both: Castro, Han, Masterjohn 2023, arXiv:2312.03908). "sap": springs and
+            dampers in its place, lifted likewise (Castro, Permenter, Han 2022, arXiv:2110.10107).
     """
 
     name: str = "drake"
-    approximation: str = "sap"
+    approximation: str = "lagged"
 
     def __post_init__(self) -> None:
         known_name("approximation", self.approximation, APPROXIMATIONS)
@@ -39,7 +39,7 @@ class DrakeEngine(Engine):
     def check(self, robot: Robot, scenario: Scenario, base: str) -> None:
         """See `Engine`."""
         known_name("base", base, BASES)
-        beyond = ", ".join(self._beyond(robot, scenario))
+        beyond = ", ".join(_beyond(scenario))
         if beyond:
             raise InvalidInput(
                 f"scenario '{scenario.name}': {self.name} cannot simulate {beyond}; leave that "
@@ -59,12 +59,9 @@ class DrakeEngine(Engine):
             robot, scenario, n, base=base, servo=servo, approximation=self.approximation
         )
 
-    def _beyond(self, robot: Robot, scenario: Scenario) -> Iterator[str]:
-        """Names of what a scenario has and Drake has not."""
-        for name in ("ground_roughness", "step_height", "mjcf", "edit"):
-            if getattr(scenario, name):
-                yield name
-        own = (robot.bare or robot).model.friction[-robot.nu :]
-        dry = scenario.by_joint("coulomb", robot) + own
-        if self.approximation == "tamsi" and dry.any():
-            yield "coulomb by tamsi"
+
+def _beyond(scenario: Scenario) -> Iterator[str]:
+    """Names of what a scenario has and Drake has not."""
+    for name in ("ground_roughness", "step_height", "mjcf", "edit"):
+        if getattr(scenario, name):
+            yield name

@@ -36,7 +36,6 @@ _APPROXIMATIONS = {
     "sap": DiscreteContactApproximation.kSap,
     "lagged": DiscreteContactApproximation.kLagged,
     "similar": DiscreteContactApproximation.kSimilar,
-    "tamsi": DiscreteContactApproximation.kTamsi,
 }
 
 _STICKING = 1e-4
@@ -103,7 +102,9 @@ def build_plant(robot: Robot, scenario: Scenario, *, base: str, approximation: s
         plant.Finalize()
         diagram = builder.Build()
     except RuntimeError as error:
-        raise InvalidInput(f"{robot.name}: Drake refuses it ({' '.join(str(error).split())})") from error
+        raise InvalidInput(
+            f"{robot.name}: Drake refuses it ({' '.join(str(error).split())})"
+        ) from error
     joints = [plant.GetJointByName(name) for name in robot.joint_names]
     return Plant(
         diagram,
@@ -161,7 +162,7 @@ def _add_link(plant: Any, model: pin.Model, index: int, parent: Any) -> Any:
     place = model.jointPlacements[index]
     at = RigidTransform(RotationMatrix(place.rotation), place.translation)
     frame = plant.AddFrame(FixedOffsetFrame(f"{name}_frame", parent.body_frame(), at))
-    joint = plant.AddJoint(RevoluteJoint(name, frame, body.body_frame(), list(_AXES[kind])))
+    joint = plant.AddJoint(RevoluteJoint(name, frame, body.body_frame(), np.array(_AXES[kind])))
     address = model.joints[index].idx_q
     low, high = model.lowerPositionLimit[address], model.upperPositionLimit[address]
     joint.set_position_limits([low], [high])
