@@ -31,7 +31,7 @@ class DrakeEngine(Engine):
     """
 
     name: str = "drake"
-    approximation: str = "lagged"
+    approximation: str = "sap"
 
     def __post_init__(self) -> None:
         known_name("approximation", self.approximation, APPROXIMATIONS)

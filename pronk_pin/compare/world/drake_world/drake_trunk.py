@@ -63,7 +63,8 @@ class DrakeTrunk:
             if self.turns:
                 twist[..., 1, 1] = state[..., self._v + 2]
         rotation = rotation_matrix(self.pose(state)[..., 3:])
-        return np.einsum("...ji,...kj->...ki", rotation, twist).reshape(*twist.shape[:-2], 6)
+        turned: Array = np.einsum("...ji,...kj->...ki", rotation, twist)
+        return turned.reshape(*turned.shape[:-2], 6)
 
     def generalized(self, state: Array, force: Array, point: Array) -> Array:
         """Generalized force of a force on the trunk, as its first entries of v have it.

@@ -194,8 +194,7 @@ class _Stepper:
 
     def __init__(self, whole: Plant) -> None:
         plant = whole.plant
-        self._root = whole.diagram.CreateDefaultContext()  # owns the next one
-        self._context = plant.GetMyMutableContextFromRoot(self._root)
+        self._root, self._context = whole.context()
         held = plant.get_desired_state_input_port(default_model_instance())
         held.FixValue(self._context, np.zeros(held.size()))  # where dry friction holds a joint
         self.nv: int = plant.num_velocities()
@@ -203,7 +202,7 @@ class _Stepper:
         self._update = plant.CalcForcedDiscreteVariableUpdate
         self._apply = plant.get_applied_generalized_force_input_port().FixValue
         self._contacts = plant.get_contact_results_output_port().Eval
-        self._feet, self._ground = whole.foot_bodies, int(plant.world_body().index())
+        self._feet = whole.foot_bodies
 
     def step(self, state: Array, applied: Array, force: Array) -> Array | None:
         """Step from a state [q, v] under a generalized force; None where Drake gives up.
@@ -223,11 +222,8 @@ class _Stepper:
             return None
         for index in range(contacts.num_point_pair_contacts()):
             contact = contacts.point_pair_contact_info(index)
-            first, second = int(contact.bodyA_index()), int(contact.bodyB_index())
-            if second == self._ground:  # the force is that on the second
-                force[self._feet[first]] -= contact.contact_force()
-            else:
-                force[self._feet[second]] += contact.contact_force()
+            # The foot comes first, as it was registered before the ground, on which the force is.
+            force[self._feet[int(contact.bodyA_index())]] -= contact.contact_force()
         after: Array = self._after.value().copy()
         return after
 

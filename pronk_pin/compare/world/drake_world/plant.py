@@ -5,6 +5,9 @@ Body frames are Pinocchio's joint frames; links that are fixed to each other are
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,11 +44,17 @@ _APPROXIMATIONS = {
 _STICKING = 1e-4
 """Joint speed below which dry friction holds, as a stiff damper [rad/s]."""
 
-_AXES = {
-    "JointModelRX": (1.0, 0.0, 0.0),
-    "JointModelRY": (0.0, 1.0, 0.0),
-    "JointModelRZ": (0.0, 0.0, 1.0),
-}
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Keep Drake from telling each time that ground is not for deformable bodies."""
+    log = logging.getLogger("drake")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 class Plant(NamedTuple):
@@ -63,6 +72,12 @@ class Plant(NamedTuple):
     """Foot, in the order of `Robot.foot_names`, by the index of the body that it is part of."""
     trunk: pin.Inertia
     """Inertia of the trunk with its payload, in the trunk's frame."""
+
+    def context(self) -> tuple[Any, Any]:
+        """Scratch memory: that of the diagram, which owns it, and the plant's part of it."""
+        with _without_warnings():
+            root = self.diagram.CreateDefaultContext()
+        return root, self.plant.GetMyMutableContextFromRoot(root)
 
 
 def build_plant(robot: Robot, scenario: Scenario, *, base: str, approximation: str) -> Plant:
@@ -155,15 +170,20 @@ def _add_trunk(plant: Any, inertia: pin.Inertia, base: str) -> Any:
 
 def _add_link(plant: Any, model: pin.Model, index: int, parent: Any) -> Any:
     """Add what one of Pinocchio's joints moves, and the joint; returns the body."""
-    name, kind = model.names[index], model.joints[index].shortname()
-    if kind not in _AXES:
-        raise InvalidInput(f"joint {name} is a {kind}; Drake's worlds have hinges about x, y or z")
+    name, kind = model.names[index], model.joints[index]
+    motion = kind.createData()
+    kind.calc(motion, pin.neutral(model))
+    axis: Any = np.ravel(motion.S)[3:]
+    if kind.nv != 1 or not np.any(axis):
+        raise InvalidInput(
+            f"joint {name} is a {kind.shortname()}; in Drake's worlds are hinges only"
+        )
     body = plant.AddRigidBody(f"{name}_link", _spatial(model.inertias[index]))
     place = model.jointPlacements[index]
     at = RigidTransform(RotationMatrix(place.rotation), place.translation)
     frame = plant.AddFrame(FixedOffsetFrame(f"{name}_frame", parent.body_frame(), at))
-    joint = plant.AddJoint(RevoluteJoint(name, frame, body.body_frame(), np.array(_AXES[kind])))
-    address = model.joints[index].idx_q
+    joint = plant.AddJoint(RevoluteJoint(name, frame, body.body_frame(), axis))
+    address = kind.idx_q
     low, high = model.lowerPositionLimit[address], model.upperPositionLimit[address]
     joint.set_position_limits([low], [high])
     return body
