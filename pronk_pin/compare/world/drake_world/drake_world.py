@@ -60,10 +60,9 @@ class DrakeWorld(World):
         self._joints = 1 + self._plant.joints
         self._rates = 1 + plant.num_positions() + self._plant.rates
         self._constant = scenario.by_joint("torque_constant", robot)
-        self._servo = None
-        if servo is not None:
-            self._servo = servo.proportional(robot.nu), servo.derivative(robot.nu)
+        self._nv: int = plant.num_velocities()
         self._state = np.zeros((n, 1 + plant.num_multibody_states()))
+        self._servo = None if servo is None else self._servo_law(servo)
         self.force = np.zeros((n, len(robot.foot_names), 3))
         self.reset(np.zeros((n, 2)), np.tile(robot.standing[7:], (n, 1)))
 
@@ -92,7 +91,9 @@ class DrakeWorld(World):
         path[..., 0] = path[:, :1, 0] + self.scenario.timestep * np.arange(ticks + 1)
         force = np.zeros((m, ticks, *self.force.shape[1:]))
         pushes = push_force(self.scenario, path[:, :-1, 0]) if self.scenario.pushes else [None] * m
-        for robot in zip(path, control, force, pushes, strict=True):
+        applied = np.zeros((m, ticks, self._nv))
+        applied[..., self._plant.rates] = self._constant * control
+        for robot in zip(path, applied, force, pushes, strict=True):
             self._roll(*robot)
         before = path[:, :-1]
         return Motion(
@@ -107,31 +108,38 @@ class DrakeWorld(World):
             twist=self._trunk.twist(before) if self._trunk.turns else None,
         )
 
-    def _roll(self, path: Array, control: Array, force: Array, pushes: Array | None) -> None:
+    def _roll(self, path: Array, applied: Array, force: Array, pushes: Array | None) -> None:
         """Simulate one robot: fills in its path (ticks + 1, nstate) and forces (ticks, 4, 3).
 
-        Where Drake gives up, the states to come stay NaN.
+        Where Drake gives up, the states to come stay NaN. `applied` are the controls' generalized
+        forces, shape (ticks, nv).
         """
-        stepper, servo, motors = self._stepper, self._servo, self._plant.rates
-        constant, limit, free = self._constant, self.robot.tau_max, self._trunk.free
-        joints, rates = self._joints, self._rates
-        applied = np.zeros(stepper.nv)
-        for tick, torque in enumerate(control):
+        stepper, servo, free = self._stepper, self._servo, self._trunk.free
+        centre = self._plant.trunk.lever
+        for tick, torque in enumerate(applied):
             state = path[tick]
             if servo is not None:
-                pulled = servo[0] * state[joints] + servo[1] * state[rates]
-                torque = np.minimum(np.maximum(torque - pulled, -limit), limit)
-            applied[motors] = constant * torque
+                law, limit = servo
+                torque = np.minimum(np.maximum(torque - law @ state, -limit), limit)
             if pushes is not None:
-                centre = self._plant.trunk.lever
                 push = self._trunk.generalized(state, pushes[tick], centre)
-                applied[: len(push)] = push
-            after = stepper.step(state[1:], applied, force[tick])
+                torque[: len(push)] = push
+            after = stepper.step(state[1:], torque, force[tick])
             if after is None:
                 return
             if free:  # as the step turns a quaternion, it grows
                 after[:4] /= np.sqrt(after[:4] @ after[:4])
             path[tick + 1, 1:] = after
+
+    def _servo_law(self, servo: Gains) -> tuple[Array, Array]:
+        """What servos take off the set points, by the state, and their limits [N m]: shapes
+        (nv, nstate) and (nv,)."""
+        law, limit = np.zeros((self._nv, self._state.shape[1])), np.zeros(self._nv)
+        motors = self._plant.rates
+        law[motors, self._joints] = self._constant * servo.proportional(self.robot.nu)
+        law[motors, self._rates] = self._constant * servo.derivative(self.robot.nu)
+        limit[motors] = self._constant * self.robot.tau_max
+        return law, limit
 
     @property
     def _stepper(self) -> _Stepper:
@@ -177,6 +185,11 @@ class DrakeWorld(World):
         """See `World`."""
         return self._trunk.twist(self._state)
 
+    @property
+    def state(self) -> Array:
+        """Time, Drake's q and v of each robot, a copy, shape (n, 1 + nq + nv)."""
+        return self._state.copy()
+
     def restart(self, rows: IntArray) -> None:
         """See `World`."""
         self._state[rows] = 0.0
@@ -186,18 +199,13 @@ class DrakeWorld(World):
 
 
 class _Stepper:
-    """What of Drake is called at every tick, with the scratch memory of one thread.
-
-    Attributes:
-        nv: Size of v.
-    """
+    """What of Drake is called at every tick, with the scratch memory of one thread."""
 
     def __init__(self, whole: Plant) -> None:
         plant = whole.plant
         self._root, self._context = whole.context()
         held = plant.get_desired_state_input_port(default_model_instance())
         held.FixValue(self._context, np.zeros(held.size()))  # where dry friction holds a joint
-        self.nv: int = plant.num_velocities()
         self._after = plant.AllocateDiscreteVariables()
         self._update = plant.CalcForcedDiscreteVariableUpdate
         self._apply = plant.get_applied_generalized_force_input_port().FixValue
