@@ -6,7 +6,7 @@ A document asks for the output of a command between two markers, which cog (coga
     <!-- [[[end]]] -->
 
 `make figures` runs them all; with `DOCUMENTS=docs/engines.md` those of one page. The slow test
-`tests/test_documents.py` runs them again and compares the numbers.
+`tests/test_document_figures.py` runs them again and compares the numbers.
 """
 
 from __future__ import annotations
