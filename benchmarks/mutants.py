@@ -76,7 +76,8 @@ class Fault:
 
     Attributes:
         path: The file, from the root.
-        start, end: The characters that are replaced, as offsets in bytes.
+        start, end: What is replaced, as offsets in bytes.
+        old: What stands there.
         text: What stands there instead.
         line: Number of its first line.
     """
@@ -84,6 +85,7 @@ class Fault:
     path: Path
     start: int
     end: int
+    old: str
     text: str
     line: int
 
@@ -92,14 +94,13 @@ class Fault:
         """Folder of the file within the package."""
         return self.path.parent.relative_to("pronk_pin").as_posix()
 
-    def source(self) -> bytes:
+    def put_into(self, source: bytes) -> bytes:
         """The file with the fault."""
-        source = (ROOT / self.path).read_bytes()
+        assert source[self.start : self.end].decode() == self.old
         return source[: self.start] + self.text.encode() + source[self.end :]
 
     def __str__(self) -> str:
-        before = (ROOT / self.path).read_bytes()[self.start : self.end].decode()
-        short = " ".join(before.split())
+        short = " ".join(self.old.split())
         short = short if len(short) < 50 else f"{short[:46]} ..."
         return f"{self.path}:{self.line}: {short} -> {' '.join(self.text.split()) or 'nothing'}"
 
@@ -118,7 +119,9 @@ def faults(path: Path) -> list[Fault]:
         return lines[row - 1] + column
 
     def change(start: int, end: int, text: str) -> Fault:
-        return Fault(path, start, end, text, source.count(b"\n", 0, start) + 1)
+        return Fault(
+            path, start, end, source[start:end].decode(), text, source.count(b"\n", 0, start) + 1
+        )
 
     def between(left: ast.AST, right: ast.AST, old: type) -> Iterator[Fault]:
         start, end = place(left, end=True), place(right)
@@ -199,7 +202,7 @@ def _acting(node: ast.AST) -> Iterator[ast.AST]:
 
 def _compiles(fault: Fault) -> bool:
     try:
-        compile(fault.source(), "fault", "exec")
+        compile(fault.put_into((ROOT / fault.path).read_bytes()), "fault", "exec")
     except (SyntaxError, ValueError):
         return False
     return True
@@ -296,14 +299,15 @@ class Bench:
     def notices(self, fault: Fault, *, own: bool) -> str:
         """What became of a fault: "noticed", "not noticed", or "no answer" in time."""
         begin, path = time.monotonic(), self.folder / fault.path
+        whole = path.read_bytes()  # which nobody else changes meanwhile
         for tests in stages(fault, own=own):
-            path.write_bytes(fault.source())
+            path.write_bytes(fault.put_into(whole))
             try:
                 failing = self.failing(tests, self.limit - (time.monotonic() - begin))
             except subprocess.TimeoutExpired:
                 return "no answer"
             finally:
-                shutil.copy2(ROOT / fault.path, path)
+                path.write_bytes(whole)
             if failing and self.failing([failing], self.limit):
                 raise SystemExit(f"{failing} fails without any fault; mend it first")
             if failing:

@@ -38,7 +38,7 @@ def test_a_seed_draws_the_same_faults_as_many_in_each_room(mutants: ModuleType) 
 def test_a_fault_is_one_change_of_a_program_that_compiles(mutants: ModuleType) -> None:
     for fault in mutants.draw(12, 0, ["dynamics", "gait/audit", "viz/figures"]):
         before = (ROOT / fault.path).read_bytes()
-        after = fault.source()
+        after = fault.put_into(before)
         assert after[: fault.start] == before[: fault.start]
         assert after.endswith(before[fault.end :])
         trees = [ast.dump(ast.parse(text)) for text in (before, after)]
@@ -73,7 +73,7 @@ def test_what_a_line_can_become(
 ) -> None:
     monkeypatch.setattr(mutants, "ROOT", tmp_path)
     (tmp_path / "one.py").write_text(line)
-    found = {fault.source().decode() for fault in mutants.faults(Path("one.py"))}
+    found = {fault.put_into(line.encode()).decode() for fault in mutants.faults(Path("one.py"))}
     assert found == changed
 
 
