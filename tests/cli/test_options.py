@@ -11,6 +11,7 @@ import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
@@ -397,6 +398,16 @@ def test_what_is_reproduced_are_the_learners_of_the_suite(
     names = load_suite("paper").controller_names
     assert "pd" in names
     assert set(given["learners"]) == {*names} - {"pd"}
+
+
+def test_what_is_reproduced_is_printed_with_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = SimpleNamespace(folder=tmp_path / "made")
+    monkeypatch.setattr("pronk_pin.compare.run_experiment", lambda *_, **__: made)
+    monkeypatch.setattr(STUDY + "format_reproduction", lambda *_, **__: "the rows")
+    assert main(["reproduce"]) == 0
+    assert capsys.readouterr().out == f"the rows\n\nresults  {made.folder}\n"
 
 
 def drawn(given: Arguments) -> float:
