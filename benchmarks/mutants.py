@@ -294,7 +294,7 @@ class Bench:
         )
         if done.returncode in (0, 5):  # 5: all of them are skipped or slow
             return ""
-        told = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.MULTILINE)
+        told = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, flags=re.MULTILINE)
         return told[0] if told else tests[0]
 
     def notices(self, fault: Fault, *, own: bool) -> str:
