@@ -270,3 +270,13 @@ def test_a_summary_of_several_seeds_is_drawn_as_their_mean() -> None:
     table.loc[table["metric"] == "upright", "joint"] = "-"
     axes = panel(errors_by_speed(table, scenario="nominal"), "calf")
     np.testing.assert_allclose(curve(axes, "PD"), [[0.1, 0.11], [0.3, 0.31]])
+
+
+def test_errors_are_drawn_from_zero_on_so_that_they_can_be_compared(
+    results: Results, strides: dict[str, xr.Dataset]
+) -> None:
+    for figure in (
+        errors_by_speed(results.summary(), scenario="nominal"),
+        learning_curves(strides),
+    ):
+        assert [axes.get_ylim()[0] for axes in figure.axes] == [0.0, 0.0]
