@@ -4,6 +4,11 @@ Comes in: a summary, or `Results`.
 Goes out: tables and text for a terminal and for the report.
 """
 
+from .between_engines import (
+    errors_between_engines,
+    format_between_engines,
+    winners_between_engines,
+)
 from .cells import against_model, beat_text, between, number, units_of_intervals
 from .difference import format_changes
 from .limitations import limitations
@@ -31,7 +36,9 @@ __all__ = [
     "beside_note",
     "beside_the_paper",
     "between",
+    "errors_between_engines",
     "families",
+    "format_between_engines",
     "format_changes",
     "format_suite",
     "format_summary",
@@ -43,4 +50,5 @@ __all__ = [
     "sampled_scenarios",
     "units_of_intervals",
     "verdict",
+    "winners_between_engines",
 ]

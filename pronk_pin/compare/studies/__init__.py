@@ -15,6 +15,7 @@ from .driving import (
     measure_wandering,
     summarize_driving,
 )
+from .engine_transfer import describe_engine_transfer, measure_engine_transfer
 from .gain_reduction import describe_gains, sweep_gains
 from .identified_models import close_loop, format_loop
 from .prediction import (
@@ -41,6 +42,7 @@ __all__ = [
     "close_loop",
     "compare_prediction",
     "describe_driving",
+    "describe_engine_transfer",
     "describe_gains",
     "describe_prediction",
     "describe_seeding",
@@ -50,6 +52,7 @@ __all__ = [
     "format_loop",
     "format_reproduction",
     "measure_driving",
+    "measure_engine_transfer",
     "measure_seeding",
     "measure_stability",
     "measure_transfers",
