@@ -226,7 +226,7 @@ def _contact(robot: Robot, scenario: Scenario, approximation: str) -> Any:
     k = m / T^2. SAP has their critical damping, too, 2 m / T, as a relaxation time of 2 T; the
     others are damped by `_DISSIPATION`.
     """
-    mass = robot.mass / len(robot.foot_names)
+    mass = (robot.bare or robot).mass / len(robot.foot_names)
     constant = scenario.ground_time_constant
     properties, friction = ProximityProperties(), scenario.ground_friction
     AddContactMaterial(
