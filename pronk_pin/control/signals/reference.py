@@ -12,6 +12,9 @@ from ..._typing import Array, IntArray
 from ...errors import InvalidInput
 from ...gait import GaitPhase
 
+LATEST_TOUCHDOWN = 2.0
+"""Longest flight, over its planned duration, after which it ends without a touchdown."""
+
 _NOTICED = 2e-5
 """Change of a duration [s] below which a reference stays unchanged."""
 
