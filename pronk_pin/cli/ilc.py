@@ -131,13 +131,16 @@ class Drive:
     command: tuple[str, ...] = ()
     """Speed profiles, each in quotes: "0 4s, 0->0.8 2s, 0.8 4s", a speed [m/s] and how long, or two
     with an arrow. Where a piece begins at another speed than the last ended, the command steps. By
-    default ramps and steps up and down."""
+    default ramps and steps up and down. A csv file of time and speed is one, too."""
     controllers: tuple[str, ...] = ("pd", "model", "library", "library+ilc")
     """Controllers."""
     scenario: str = "nominal"
     """Scenario, of the learning and of the driving."""
-    reference: str = "commanded"
-    """Speed by which gaits are chosen: commanded, or measured, that of the torso."""
+    reference: tuple[str, ...] = ("commanded",)
+    """Speeds by which gaits are chosen: commanded, or measured, that of the torso; or both."""
+    push: float = 0.0
+    """Impulse of a push forward, once, after three fifths of the longest command [N s]; with one
+    the default commands are constant speeds."""
     robot: str = "a1"
     """Robot."""
     figure: Path = Path("driving.png")
@@ -145,21 +148,25 @@ class Drive:
 
     def run(self) -> None:
         """Do it."""
+        from .._checks import Interval, real
         from ..compare import load_scenario
-        from ..compare.studies import RAMPS, describe_driving, measure_driving
+        from ..compare.report import format_commands
+        from ..compare.studies import PUSHED, RAMPS, measure_driving
         from ..viz import known_figure, save_figure
         from ..viz.figures import driving_figure
 
         known_figure(self.figure)
-        table = measure_driving(
-            self.command or RAMPS,
+        real("push", self.push, Interval(-200, 200, "N s"))
+        driving = measure_driving(
+            self.command or (PUSHED if self.push else RAMPS),
             load_scenario(self.scenario),
             controllers=self.controllers,
             robot=self.robot,
-            reference=self.reference,
+            references=self.reference,
+            push=self.push,
         )
-        print(describe_driving(table))
-        print(f"\nfigure  {save_figure(driving_figure(table), self.figure)}")
+        print(format_commands(driving.summary))
+        print(f"\nfigure  {save_figure(driving_figure(driving.strides), self.figure)}")
 
 
 @dataclass(frozen=True)

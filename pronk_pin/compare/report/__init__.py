@@ -5,6 +5,7 @@ Goes out: tables and text for a terminal and for the report.
 """
 
 from .cells import against_model, beat_text, between, number, units_of_intervals
+from .commands import command_tables, format_commands, shortened
 from .difference import format_changes
 from .limitations import limitations
 from .overview import ControllerOverview, JointOverview, Overview, answer, overview
@@ -31,8 +32,10 @@ __all__ = [
     "beside_note",
     "beside_the_paper",
     "between",
+    "command_tables",
     "families",
     "format_changes",
+    "format_commands",
     "format_suite",
     "format_summary",
     "format_tables",
@@ -41,6 +44,7 @@ __all__ = [
     "overview",
     "paper_learner",
     "sampled_scenarios",
+    "shortened",
     "units_of_intervals",
     "verdict",
 ]

@@ -7,13 +7,13 @@ loop closed with an identified model.
 
 from .driving import (
     DRIVERS,
+    PUSHED,
     RAMPS,
     SWEEPS,
-    describe_driving,
+    Driving,
     describe_wandering,
     measure_driving,
     measure_wandering,
-    summarize_driving,
 )
 from .gain_reduction import describe_gains, sweep_gains
 from .identified_models import close_loop, format_loop
@@ -33,14 +33,15 @@ from .transfer import TOLERANCE, describe_transfers, measure_transfers
 __all__ = [
     "COUPLINGS",
     "DRIVERS",
+    "PUSHED",
     "RAMPS",
     "STRIDES",
     "SWEEPS",
     "TOLERANCE",
+    "Driving",
     "Prediction",
     "close_loop",
     "compare_prediction",
-    "describe_driving",
     "describe_gains",
     "describe_prediction",
     "describe_seeding",
@@ -57,6 +58,5 @@ __all__ = [
     "simulate_learning",
     "stayed_up",
     "stored_learning",
-    "summarize_driving",
     "sweep_gains",
 ]

@@ -20,7 +20,8 @@ COMPARED = ("thigh", "calf")
 """Joints whose errors are compared."""
 
 # At 0.8 m/s it takes 20 s until the touchdown stays at one tick.
-_LONG = Schedule(0.5, 4.0, 28.0)
+LONG = Schedule(0.5, 4.0, 28.0)
+"""Baseline and learning until the touchdowns have settled."""
 
 
 def learning_law(spec: ControllerSpec) -> LearningLaw:
@@ -55,7 +56,7 @@ def learn(
 ) -> xr.Dataset:
     """Learn until the touchdowns have settled; the strides, of which a torque library is made."""
     rng = np.random.default_rng(0)
-    return simulate(robot, gaits, spec, scenario, schedule=_LONG, rng=rng)
+    return simulate(robot, gaits, spec, scenario, schedule=LONG, rng=rng)
 
 
 def mean_peaks(strides: xr.Dataset, robot: int | None = None) -> dict[str, float | int]:
