@@ -272,6 +272,7 @@ class Explain:
 
         self._check()
         results = Results.load(self.result)
+        results.check_constant("explain")
         if self.speed is not None:
             nearest(results.experiment.speeds, self.speed, "speed")
         cell = results.find(controller=self.controller, scenario=self.scenario)

@@ -10,9 +10,22 @@ from .._typing import Array, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait
 from .controller_spec import ControllerSpec
-from .learning import Memory
+from .learning import Memory, ModelBasedILC
 from .signals import LATEST_TOUCHDOWN, Reference
 from .speed_command import SpeedCommand
+
+
+def check_follows(spec: ControllerSpec) -> None:
+    """Refuse a controller whose law is made of one gait's model.
+
+    Raises:
+        InvalidInput: It is.
+    """
+    if any(isinstance(law, ModelBasedILC) for law in spec.laws):
+        raise InvalidInput(
+            f"controller '{spec.name}' learns by a model of one gait, and with a commanded speed "
+            "gaits change; choose another law, as that of 'library+ilc'"
+        )
 
 
 class CommandFollower:
@@ -30,7 +43,7 @@ class CommandFollower:
         feedforward: What they play [N m], shape (n, 2, samples, 12), which changes.
 
     Raises:
-        InvalidInput: The controller's guard is of one gait.
+        InvalidInput: The controller's guard, or its law, is of one gait.
     """
 
     def __init__(
@@ -48,6 +61,7 @@ class CommandFollower:
                 f"controller '{spec.name}' cannot change its gait, as the guard of its learning is "
                 "of one gait; use it with guard=None"
             )
+        check_follows(spec)
         self._command, self._profile = command, spec.regulator.profile
         self._stance, self._flight, self._feedforward = stance, flight, feedforward
         self._gaits = list(gaits)  # those that are flown to, or stood in

@@ -26,6 +26,7 @@ from ...control import (
     ControllerSpec,
     ExtendedStateObserver,
     SpeedProfile,
+    check_follows,
     level_robot,
     load_controller,
 )
@@ -270,6 +271,8 @@ class Experiment(Displayed):
                 f"speeds are commanded on base 'locked' only, and this is '{self.base}'; leave the "
                 "commands out, or choose base 'locked'"
             )
+        for spec in map(load_controller, self.controllers):
+            check_follows(spec)
         for name, profile in zip(self.commands, self.profiles, strict=True):
             if profile.duration < SHORTEST:
                 raise InvalidInput(

@@ -5,7 +5,7 @@ Goes out: tables and text for a terminal and for the report.
 """
 
 from .cells import against_model, beat_text, between, number, units_of_intervals
-from .commands import command_tables, format_commands, shortened
+from .commands import answer_commands, command_tables, format_commands, shortened
 from .difference import format_changes
 from .limitations import limitations
 from .overview import ControllerOverview, JointOverview, Overview, answer, overview
@@ -27,6 +27,7 @@ __all__ = [
     "Overview",
     "against_model",
     "answer",
+    "answer_commands",
     "answer_in_words",
     "beat_text",
     "beside_note",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -49,6 +50,30 @@ def _row(rows: pd.DataFrame) -> Mapping[str, Any]:
     return {**cells, "upright": int((upright == 1.0).sum()), "robots": len(upright)}
 
 
+def answer_commands(summary: pd.DataFrame) -> str:
+    """What comes out of commanded speeds, in sentences: the worst errors, and who fell."""
+    sentences = []
+    for scenario in summary["scenario"].unique():
+        here = summary[summary["scenario"] == scenario]
+        calf = here[(here["metric"] == "worst_peak_error") & (here["joint"] == "calf")]
+        worst = calf.groupby("controller")["value"].max()
+        order = [name for name in CONTROLLERS if name in worst]
+        order += [name for name in worst.index if name not in CONTROLLERS]
+        said = ", ".join(f"{name} {number(1e3 * worst[name], '.0f')}" for name in order)
+        upright = here[here["metric"] == "upright"]["value"]
+        fell = int((upright != 1.0).sum())
+        sentences.append(
+            f"Driven by {_counted(here['command'].nunique())} in scenario {scenario}, the worst "
+            f"peak of the calf's error is, in milliradians: {said}. "
+            + (f"{fell} of {len(upright)} robots fell." if fell else "Nothing fell.")
+        )
+    return " ".join(sentences)
+
+
+def _counted(commands: int) -> str:
+    return "one command" if commands == 1 else f"{commands} commands"
+
+
 def format_commands(summary: pd.DataFrame) -> str:
     """The tables of all scenarios as text for a terminal."""
     scenarios = list(summary["scenario"].unique())
@@ -60,6 +85,7 @@ def format_commands(summary: pd.DataFrame) -> str:
         for command, table in command_tables(summary, scenario=scenario).items():
             where = f"scenario {scenario}: " if len(scenarios) > 1 else ""
             lines += ["", f"{where}{shortened(command)}", *_format(table)]
+    lines += ["", textwrap.fill(answer_commands(summary), 100)]
     return "\n".join(lines)
 
 

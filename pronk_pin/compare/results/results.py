@@ -241,11 +241,24 @@ class Results(Displayed):
         ]
         return join_speeds([self.strides(cell) for cell in cells])
 
+    def check_constant(self, what: str) -> None:
+        """Refuse a result of commanded speeds for something that needs constant ones.
+
+        Raises:
+            InvalidInput: It is one.
+        """
+        if self.experiment.commands:
+            raise InvalidInput(
+                f"{what} needs strides at constant speeds, and {self.folder} is of commanded ones; "
+                "choose a result without --command"
+            )
+
     def dataset(self) -> xr.Dataset:
         """The strides of all cells as one dataset: `dataset()["peak_error"].sel(controller="ilc")`.
 
-        Dimensions: `controller`, `scenario`, `seed` and `speed`, by name and value and in the
-        experiment's order, then those of the quantity, as `strides` has them, with their units.
+        Dimensions: `controller`, `scenario`, `seed` and `speed`, or `command` where speeds were
+        commanded, by name and value and in the experiment's order, then those of the quantity, as
+        `strides` has them, with their units.
         What there is not is NaN: strides and ticks after the end of a shorter simulation, and cells
         that are not there yet. Speeds that were added later lie among the others.
 

@@ -114,6 +114,7 @@ def stored_learning(
         InvalidInput: More was learned than the prediction covers, or elsewhere.
     """
     learning_law(spec)
+    results.check_constant("the prediction")
     experiment = results.experiment
     if not _covered(spec):
         suitable = [
