@@ -1,11 +1,12 @@
 # make compare   run the comparison of the paper, print the table, write report and replay
 # make test      run the tests
-# Both create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
+# make docs      build the documentation as a site, in site/
+# All create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
 PYTHON ?= python3
 BIN := .venv/bin
 ARGS ?=
 
-.PHONY: compare test lint clean
+.PHONY: compare test lint docs clean
 
 compare: .venv/.installed
 	$(BIN)/pronk-pin compare $(ARGS)
@@ -18,6 +19,9 @@ lint: .venv/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-issue-forms .github/ISSUE_TEMPLATE/[!c]*.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 10) <= v <= (3, 13) else "pronk-pin needs Python 3.10 to 3.13, this is %d.%d: set PYTHON=python3.12, say" % v)'
@@ -33,9 +37,16 @@ lint: .venv/.installed-dev
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	@touch $@
 
+.venv/.installed-docs: .venv/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
 .venv/.installed-dev: .venv/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@
 
+docs: .venv/.installed-docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
 clean:
-	rm -rf .venv build dist *.egg-info
+	rm -rf .venv build dist site *.egg-info

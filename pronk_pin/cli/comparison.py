@@ -57,6 +57,9 @@ class ExperimentOptions(TypedDict, total=False):
     mjcf: str
     """MJCF of the robot, with the same joint names, that stands in for its URDF in the simulation;
     by default the URDF is simulated. Scenarios add to what is in it: ideal takes it as it is."""
+    engine: Annotated[str, arg(metavar="NAME|MODULE:OBJECT")]
+    """Engine that simulates the scenarios that name none: a name of `pronk-pin list engines`, or an
+    address; by default mujoco. Scenarios may name it themselves, as nominal+drake."""
     schedule: ScheduleOptions
     """What happens when."""
     metrics: Annotated[tuple[str, ...], arg(metavar="[MODULE:OBJECT [...]]")]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from ...errors import InvalidInput
 from ...gait import Gait
 from ..experiment import Cell, Experiment
 from ..simulation import SHORTER, check_memory, number_of_robots
+from ..world import engine_of
 
 LONGEST = 30.0
 """Days that an experiment may take, by a hopeful estimate."""
@@ -15,6 +18,18 @@ _QUICK = 25.0
 takes a minute on two cores for 14 robots, 5 controllers and 40.5 s. Tick by tick it is less."""
 
 _DAY = 86_400.0
+
+
+def check_engines(cells: Iterable[Cell]) -> None:
+    """Check that the engines of simulations are installed, and can do what is asked of them.
+
+    Raises:
+        UnknownName, InvalidInput, MissingExtra: One cannot; see `Engine.check`.
+    """
+    asked = {(cell.scenario, cell.seed): cell for cell in cells}
+    for cell in asked.values():
+        world = cell.world
+        engine_of(world).check(cell.experiment.model, world, cell.experiment.base)
 
 
 def check_demand(experiment: Experiment, workers: int) -> None:

@@ -38,7 +38,7 @@ from ..results import (
     remove_if_empty,
 )
 from ..simulation import Progress
-from .demand import check_demand
+from .demand import check_demand, check_engines
 from .executors import WorkerPool, connect, known_address, processes
 
 MAX_RETRIES = 3
@@ -82,7 +82,8 @@ def run_experiment(
             begun with other versions or another MJCF, or another run is writing there; or the MJCF
             cannot be read.
         InvalidInput: The MJCF is not of this robot, no worker is allowed, or the experiment is too
-            large: see `check_demand`.
+            large, see `check_demand`; or an engine cannot simulate a scenario.
+        MissingExtra: An engine is not installed.
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
         NoMainGuard: They ended at once, as the script that wants them guards no main code.
@@ -124,6 +125,7 @@ def _complete(
         return  # who made the strides stays on record
     check_completion(results)
     robots = len(results.experiment.commands or results.experiment.speeds)
+    check_engines(cells)
     with tqdm(
         total=sum(map(_robot_steps, cells)),
         desc=f"simulating {robots} robots x {len(cells)}",

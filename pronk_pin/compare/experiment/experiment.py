@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
+from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of, text
 from ..._display import Displayed, listed, spanned
 from ..._typing import Array
 from ...control import (
@@ -44,7 +44,7 @@ from ...robot import (
 )
 from ..metrics import Metric, load_metric
 from ..simulation import SHORTEST, Schedule
-from ..world import Scenario, load_scenario, shipped_scenario
+from ..world import DEFAULT_ENGINE, Scenario, load_scenario, shipped_scenario
 from .description import describe
 from .entries import digest_of, name_of, named, shortest
 
@@ -89,8 +89,10 @@ class Experiment(Displayed):
             nothing is random they hardly differ; `rough` is the scenario for many.
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         mjcf: MJCF of the robot, with the same joint names, that stands in for its URDF in the
-            simulation; see `compare.world.mjcf`. The scenarios add to what is in it: "ideal" takes
+            simulation; see `mjcf_spec`. The scenarios add to what is in it: "ideal" takes
             it as it is. The file is read when the experiment is run, and not before.
+        engine: Engine for all scenarios that name none, see `Scenario.engine`; from then on it
+            stands in the scenarios' names, and here it is empty.
         schedule: What happens when.
         metrics: Metrics of one's own, beside ours: `Metric` objects, or their addresses.
         commands: Speeds that change, one robot each, instead of constant ones: speed profiles as
@@ -113,6 +115,7 @@ class Experiment(Displayed):
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
     mjcf: str = ""
+    engine: str = ""
     schedule: Schedule = field(default_factory=Schedule)
     metrics: tuple[str | Metric, ...] = ()
     commands: tuple[str, ...] = ()
@@ -131,6 +134,12 @@ class Experiment(Displayed):
             keep(self, "controllers", default_controllers(self.model))
         specs = [load_controller(value) for value in self.controllers]
         worlds = [load_scenario(value) for value in self.scenarios]
+        if self.engine:
+            worlds = [
+                world.in_engine(self.engine) if world.engine == DEFAULT_ENGINE else world
+                for world in worlds
+            ]
+        keep(self, "engine", "")
         keep_controllers = tuple(shortest("controller", spec, CONTROLLERS.get) for spec in specs)
         keep(self, "controllers", keep_controllers)
         keep(self, "scenarios", tuple(shortest("scenario", w, shipped_scenario) for w in worlds))
@@ -213,6 +222,7 @@ class Experiment(Displayed):
         keep(self, "apex", none_or(real, "apex", self.apex))
         if not isinstance(self.mjcf, str) or self.mjcf:
             keep(self, "mjcf", str(path("mjcf", self.mjcf)))
+        text("engine", self.engine)
         instance_of("schedule", self.schedule, Schedule)
         known_name("speed of reference", self.reference, REFERENCES)
 

@@ -40,6 +40,7 @@ class _Document:
     seeds: tuple[int, ...] | None = None
     base: str | None = None
     mjcf: str | None = None
+    engine: str | None = None
     schedule: Schedule | None = None
     metrics: tuple[str | dict[str, Any], ...] | None = None
     commands: tuple[str, ...] | None = None
@@ -50,6 +51,7 @@ class _Document:
 def to_document(experiment: Experiment) -> dict[str, Any]:
     """The experiment as JSON has it; gaits of one's own are the file `GAITS` beside it."""
     whole = {part.name: getattr(experiment, part.name) for part in dataclasses.fields(experiment)}
+    del whole["engine"]  # it stands in the scenarios
     own = not isinstance(experiment.gaits, str)
     constant = () if experiment.commands else ("commands", "reference")
     return {

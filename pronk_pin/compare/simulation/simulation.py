@@ -25,7 +25,7 @@ from ...control import (
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
 from ...robot import BASES, Robot
-from ..world import Scenario, without_warnings
+from ..world import Scenario
 from .dataset import to_dataset
 from .log import StrideLog
 from .memory import check_memory
@@ -163,7 +163,7 @@ class Simulation:
                     self._stride(going[late == ticks], steps=steps, late=int(ticks))
                 report()
 
-        with without_warnings(), ThreadPoolExecutor(self._threads) as pool:
+        with self.world.running(), ThreadPoolExecutor(self._threads) as pool:
             self._startup()
             shares = np.array_split(np.arange(len(self._gaits)), self._threads)
             side_by_side = pool.map if self._threads > 1 else map

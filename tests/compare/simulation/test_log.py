@@ -140,10 +140,11 @@ def test_far_from_the_end_no_ticks_are_kept(log: StrideLog) -> None:
 def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
     log, rows, rng = TickLog(3, 50, load_robot()), np.array([0, 2]), np.random.default_rng(0)
     states = rng.normal(size=(2, 20, 28))
-    force, path = rng.normal(size=(2, 20, 4, 3)), np.zeros((2, 21, 1))
+    force, finite = rng.normal(size=(2, 20, 4, 3)), np.ones((2, 20), dtype=bool)
     joints, rates = states[..., :12], states[..., 12:24]
     pose, twist = rng.normal(size=(2, 20, 7)), rng.normal(size=(2, 20, 6))
-    motion = Motion(states[..., 24:26], states[..., 26:], joints, rates, force, path, pose, twist)
+    base, base_rate = states[..., 24:26], states[..., 26:]
+    motion = Motion(base, base_rate, joints, rates, force, finite, None, pose, twist)
     reference, feedforward = rng.normal(size=(2, 2, 25, 12))
     tape = Tape(feedforward, reference, 0.0 * reference, np.full(2, 25), begin=5)
     limit, gains = np.full(12, 20.0), Gains()
