@@ -85,9 +85,9 @@ class CommandFollower:
         """
         command, flight = self._command, self._flight
         change = command.change(rows, commanded, measured)
-        flight.change(rows, [gait.flight for gait in change.gaits], LATEST_TOUCHDOWN)
-        stretch = command.memory.stretch_at(rows, change.speed)
-        flight.stretch(rows, stretch * flight.planned[rows])
+        parts = [gait.flight for gait in change.gaits]
+        stretched = command.memory.stretch_at(rows, change.speed)
+        flight.change(rows, parts, LATEST_TOUCHDOWN, stretched=stretched)
         self._feedforward[rows, 1] = command.memory.at(rows, change.speed, 1)
         for row, gait in zip(rows, change.gaits, strict=True):
             self._gaits[row] = gait

@@ -96,22 +96,36 @@ class Reference:
         reference._tabulate(np.arange(len(parts)))
         return reference
 
-    def change(self, rows: IntArray, parts: Sequence[GaitPhase], latest: float) -> None:
-        """Change some robots to another gait's part, stretched as theirs was.
+    def change(
+        self,
+        rows: IntArray,
+        parts: Sequence[GaitPhase],
+        latest: float,
+        *,
+        stretched: Array | None = None,
+    ) -> None:
+        """Change some robots to another gait's part.
+
+        Args:
+            rows: Which robots.
+            parts: Their parts, for up to `latest` times the planned duration.
+            latest: See `of`.
+            stretched: Durations over the planned ones, shape (m,); by default as theirs were.
 
         Raises:
             InvalidInput: A part is longer than those that there is room for.
         """
-        for row, part in zip(rows, parts, strict=True):
+        if stretched is None:
+            stretched = self.duration[rows] / self.planned[rows]
+        for row, part, longer in zip(rows, parts, stretched, strict=True):
             ticks = int(np.round(latest * part.duration / self.timestep))
             if ticks > self.phase.shape[1]:
                 raise InvalidInput(
                     f"a {part.name} of {part.duration:g} s is longer than any that was announced; "
                     "name its gait among those that may be changed to"
                 )
-            stretched = self.duration[row] / self.planned[row]
             self.parts[row], self.planned[row], self.ticks[row] = part, part.duration, ticks
-            self.duration[row] = stretched * part.duration
+            self.duration[row] = longer * part.duration
         self._tabulate(rows)
 
     def stretch(self, rows: IntArray, duration: Array) -> None:
