@@ -1,12 +1,14 @@
 # make compare   run the comparison of the paper, print the table, write report and replay
 # make test      run the tests
 # make docs      build the documentation as a site, in site/
+# make figures   make the figures in the documents again, by their commands; DOCUMENTS=docs/engines.md for one page
 # All create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
 PYTHON ?= python3
 BIN := .venv/bin
 ARGS ?=
+DOCUMENTS ?= README.md $(wildcard docs/*.md)
 
-.PHONY: compare test lint docs clean
+.PHONY: compare test lint docs figures clean
 
 compare: .venv/.installed
 	$(BIN)/pronk-pin compare $(ARGS)
@@ -47,6 +49,9 @@ lint: .venv/.installed-dev
 
 docs: .venv/.installed-docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+
+figures: .venv/.installed-test
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m cogapp -r -I benchmarks $(DOCUMENTS)
 
 clean:
 	rm -rf .venv build dist site *.egg-info

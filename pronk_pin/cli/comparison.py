@@ -149,7 +149,7 @@ class Compare:
     def run(self) -> None:
         """Do it."""
         from ..compare import default_folder, mjcf_parity, run_experiment
-        from ..compare.report import format_summary
+        from ..compare.report import format_between_engines, format_summary
 
         name = "comparison" if self.suite in (None, "default") else self.suite
         folder, world = self.folder or default_folder(name), self.experiment.mjcf
@@ -164,6 +164,8 @@ class Compare:
         )
         print(f"robot {results.experiment.robot_name}, base {results.experiment.base}\n")
         print(format_summary(results.summary()))
+        if engines := format_between_engines(results):
+            print(f"\n{engines}")
         times = ", ".join(f"{name} {time:.3g}" for name, time in results.control_times.items())
         if times:
             print(f"\ntime that controllers took on this machine, a robot and tick [us]: {times}")
@@ -215,7 +217,7 @@ class Report:
     def run(self) -> None:
         """Do it."""
         from ..compare import Results
-        from ..compare.report import format_changes, format_summary
+        from ..compare.report import format_between_engines, format_changes, format_summary
         from ..viz.report import write_figures
 
         results = Results.load(self.result)
@@ -223,6 +225,8 @@ class Report:
             print(format_changes(results, Results.load(self.other)))
             return
         print(format_summary(results.summary()))
+        if engines := format_between_engines(results):
+            print(f"\n{engines}")
         _print_pages(results, str(_report(results)))
         if self.figures is not None:
             for path in write_figures(results, self.figures):

@@ -299,6 +299,38 @@ class Seeding:
 
 
 @dataclass(frozen=True)
+class Engines:
+    """Tell whether what was learned in one engine holds in another, and how far to learn on.
+
+    Each engine's torque library is replayed in the others, beside nothing and the model, and then
+    learned on from.
+    """
+
+    engines: Positional[tuple[str, ...]] = ("mujoco", "drake")
+    """Engines: names of `pronk-pin list engines`, or addresses."""
+    speed: tuple[float, ...] = ()
+    """Speeds [m/s]; by default -0.4 to 0.8 in steps of 0.4, as far as the robot's gaits go."""
+    scenario: str = "nominal"
+    """Scenario."""
+    robot: str = "a1"
+    """Robot."""
+
+    def run(self) -> None:
+        """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import describe_engine_transfer, measure_engine_transfer
+        from ..gait import load_library
+        from ..robot import load_robot
+
+        robot = load_robot(self.robot)
+        library = load_library(robot.name)
+        speeds = self.speed or _covered(self.robot, (-0.4, 0.0, 0.4, 0.8))
+        gaits = [library.at(speed) for speed in speeds]
+        table = measure_engine_transfer(robot, gaits, load_scenario(self.scenario), self.engines)
+        print(describe_engine_transfer(table))
+
+
+@dataclass(frozen=True)
 class Ilc:
     """Analyse learning laws, and what learning is good for."""
 
@@ -310,6 +342,7 @@ class Ilc:
         | Annotated[Wander, subcommand("wander")]
         | Annotated[Transfer, subcommand("transfer")]
         | Annotated[Seeding, subcommand("seeding")]
+        | Annotated[Engines, subcommand("engines")]
     )
 
     def run(self) -> None:

@@ -4,6 +4,11 @@ Comes in: a summary, or `Results`.
 Goes out: tables and text for a terminal and for the report.
 """
 
+from .between_engines import (
+    errors_between_engines,
+    format_between_engines,
+    winners_between_engines,
+)
 from .cells import against_model, beat_text, between, number, units_of_intervals
 from .commands import answer_commands, command_tables, format_commands, shortened
 from .difference import format_changes
@@ -34,7 +39,9 @@ __all__ = [
     "beside_the_paper",
     "between",
     "command_tables",
+    "errors_between_engines",
     "families",
+    "format_between_engines",
     "format_changes",
     "format_commands",
     "format_suite",
@@ -48,4 +55,5 @@ __all__ = [
     "shortened",
     "units_of_intervals",
     "verdict",
+    "winners_between_engines",
 ]

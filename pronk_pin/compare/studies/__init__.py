@@ -15,6 +15,7 @@ from .driving import (
     measure_driving,
     measure_wandering,
 )
+from .engine_transfer import describe_engine_transfer, measure_engine_transfer
 from .gain_reduction import describe_gains, sweep_gains
 from .identified_models import close_loop, format_loop
 from .prediction import (
@@ -42,6 +43,7 @@ __all__ = [
     "Prediction",
     "close_loop",
     "compare_prediction",
+    "describe_engine_transfer",
     "describe_gains",
     "describe_prediction",
     "describe_seeding",
@@ -51,6 +53,7 @@ __all__ = [
     "format_loop",
     "format_reproduction",
     "measure_driving",
+    "measure_engine_transfer",
     "measure_seeding",
     "measure_stability",
     "measure_transfers",

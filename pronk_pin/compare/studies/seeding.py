@@ -6,18 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
 from ..._typing import Array
 from ...control import ControllerSpec, InitialFeedforward, TorqueLibrary, load_controller
 from ...gait import Gait, load_library
-from ...robot import JOINTS, Robot, load_robot
+from ...robot import Robot, load_robot
 from ..experiment import initial_feedforward, torque_library
 from ..metrics import STEADY_STRIDES, settling_stride
 from ..report import number
 from ..simulation import Schedule, simulate
 from ..world import Scenario
-from .learning_runs import COMPARED, learn, speeds_with_neighbours
+from .learning_runs import COMPARED, learn, peaks_by_stride, speeds_with_neighbours
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")
 """The same laws, from nothing, from the model's feedforward, and from the torque library."""
@@ -62,7 +61,7 @@ def measure_seeding(
             rng=np.random.default_rng(0),
             initial=_seed(spec, machine, inner, stored),
         )
-        tables.append(_by_stride(spec, speeds[1:-1], strides))
+        tables.append(peaks_by_stride(strides).assign(controller=spec.name))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -138,31 +137,6 @@ def _seed(
     if spec.source == "library":
         return stored.left_out(np.array([gait.speed for gait in gaits]))[0]
     return initial_feedforward(spec, gaits, model=robot)
-
-
-def _by_stride(spec: ControllerSpec, speeds: Sequence[float], strides: xr.Dataset) -> pd.DataFrame:
-    """Peaks of each robot from the last stride before the learning on."""
-    learning, peak, upright = (
-        strides[name].to_numpy() for name in ("learning", "peak_error", "upright")
-    )
-    first, rows = np.argmax(learning == 1, axis=1), []
-    length = int((strides["count"].to_numpy() - first).min()) + 1  # as many of each robot
-    for k, speed in enumerate(speeds):
-        window = slice(first[k] - 1, first[k] - 1 + length)
-        peaks = peak[k, window]
-        legs = peaks.reshape(length, -1, len(JOINTS)).mean(axis=1)  # (length, 3)
-        rows.append(
-            pd.DataFrame(
-                {
-                    "controller": spec.name,
-                    "speed": speed,
-                    "stride": np.arange(length),
-                    **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
-                    "upright": upright[k, window] == 1,
-                }
-            )
-        )
-    return pd.concat(rows)
 
 
 def _curves(rows: pd.DataFrame, controller: str) -> Array:

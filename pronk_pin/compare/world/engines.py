@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from ..._registry import find, imported, is_address
 from ...errors import InvalidInput
+from .drake_world import DrakeEngine
 from .engine import Engine
 from .mujoco_world import MujocoEngine
 from .scenario import Scenario
 
-_MUJOCO = MujocoEngine()
+_SHIPPED: tuple[Engine, ...] = MujocoEngine(), DrakeEngine()
 
-ENGINES: dict[str, Engine] = {engine.name: engine for engine in (_MUJOCO,)}
+ENGINES: dict[str, Engine] = {engine.name: engine for engine in _SHIPPED}
 """Engines that are shipped, by name."""
 
 

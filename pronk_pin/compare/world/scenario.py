@@ -57,7 +57,7 @@ ByJoint: TypeAlias = float | tuple[float, ...]
 the order of q."""
 
 DEFAULT_ENGINE = "mujoco"
-OTHER_ENGINES: tuple[str, ...] = ()
+OTHER_ENGINES = ("drake",)
 """Names of the engines that are shipped; that of the first is left out in a scenario's name."""
 
 _BY_JOINT = {

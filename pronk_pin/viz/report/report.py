@@ -35,6 +35,7 @@ from ...compare.report import (
     beside_note,
     beside_the_paper,
     families,
+    format_between_engines,
     limitations,
     paper_learner,
     sampled_scenarios,
@@ -122,6 +123,9 @@ def report(results: Results, *, command: str = "") -> Document:
     document.text(answer_in_words(summary, tables=tables), "verdict")
     if len(scenarios) > 1:
         _all_scenarios(document, results, tables)
+    if engines := format_between_engines(results):
+        document.heading("Engines side by side", "engines")
+        document.text(engines, "code")
     for scenario in scenarios:
         _world(document, results, summary, tables[scenario], scenario)
     if results.foreign is not None:
