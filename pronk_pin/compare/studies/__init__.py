@@ -18,6 +18,7 @@ from .driving import (
 from .engine_transfer import describe_engine_transfer, measure_engine_transfer
 from .gain_reduction import describe_gains, sweep_gains
 from .identified_models import close_loop, format_loop
+from .learning_runs import machine_and_gaits
 from .prediction import (
     STRIDES,
     Prediction,
@@ -52,6 +53,7 @@ __all__ = [
     "describe_wandering",
     "format_loop",
     "format_reproduction",
+    "machine_and_gaits",
     "measure_driving",
     "measure_engine_transfer",
     "measure_seeding",

@@ -12,13 +12,13 @@ import pandas as pd
 
 from ...control import InitialFeedforward, SpeedCommand, SpeedProfile, load_controller
 from ...errors import InvalidInput
-from ...gait import load_library
-from ...robot import load_robot
+from ...gait import GaitLibrary
+from ...robot import RobotSpec
 from ..experiment import Experiment, run_cell, torque_library
 from ..metrics import stride_table, summarize_commands
 from ..simulation import Progress, Schedule, Simulation, simulate
 from ..world import Scenario
-from .learning_runs import COMPARED, LONG, learn, mean_peaks
+from .learning_runs import COMPARED, LONG, learn, machine_and_gaits, mean_peaks
 
 RAMPS = (
     *("0 4s, 0->0.8 8s, 0.8 4s, 0.8->0 8s, 0 4s", "0 4s, 0->0.8 2s, 0.8 4s, 0.8->0 2s, 0 4s"),
@@ -58,7 +58,8 @@ def measure_driving(
     scenario: Scenario,
     *,
     controllers: Sequence[str] = DRIVERS,
-    robot: str = "a1",
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
     references: Sequence[str] = ("commanded",),
     push: float = 0.0,
     progress: Progress | None = None,
@@ -72,7 +73,8 @@ def measure_driving(
         commands: Speed profiles, see `SpeedProfile.parse`.
         scenario: The scenario, of the learning and of the driving.
         controllers: Names of controllers.
-        robot: Short name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
         references: By which speeds gaits are chosen, see `SpeedCommand`; controllers are named with
             theirs if there are several.
         push: Impulse of a push forward, once, after three fifths of the longest command [N s].
@@ -86,6 +88,7 @@ def measure_driving(
         raise InvalidInput("no commands; give one or more, as '0 4s, 0->0.8 2s, 0.8 4s'")
     experiment = Experiment(
         robot=robot,
+        gaits=gaits,
         controllers=tuple(controllers),
         scenarios=(scenario,),
         schedule=LONG,
@@ -131,8 +134,8 @@ def _settling(summary: pd.DataFrame, table: pd.DataFrame, pushed: float) -> pd.D
 
 def _last_change(profile: SpeedProfile) -> float:
     """Time from which on a command stays as it is [s]."""
-    corners = zip(profile.times, profile.speeds, strict=True)
-    return max((time for time, speed in corners if speed != profile.speeds[-1]), default=0.0)
+    changing = np.flatnonzero(np.array(profile.speeds) != profile.speeds[-1])
+    return profile.times[changing[-1] + 1] if changing.size else 0.0
 
 
 def _strides_to_settle(strides: pd.DataFrame, since: float) -> float:
@@ -148,7 +151,12 @@ def _strides_to_settle(strides: pd.DataFrame, since: float) -> float:
 
 
 def measure_wandering(
-    command: str, scenario: Scenario, *, robot: str = "a1", reference: str = "commanded"
+    command: str,
+    scenario: Scenario,
+    *,
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
+    reference: str = "commanded",
 ) -> pd.DataFrame:
     """Learn from nothing while the speed changes, then replay at each speed what was learned.
 
@@ -157,7 +165,8 @@ def measure_wandering(
     Args:
         command: Speed profile of the learning, see `SpeedProfile.parse`.
         scenario: The scenario.
-        robot: Short name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
         reference: By which speed gaits are chosen, see `SpeedCommand`.
 
     Returns:
@@ -165,7 +174,8 @@ def measure_wandering(
         contact on in calf and thigh, `none_calf`, `practised_calf`, `driven_calf` and the like
         [rad]; NaN where a robot fell.
     """
-    profile, machine, library = SpeedProfile.parse(command), load_robot(robot), load_library(robot)
+    profile = SpeedProfile.parse(command)
+    machine, library = machine_and_gaits(robot, gaits)
     learner, replay = replace(load_controller("ilc"), guard=None), load_controller("library")
     following = SpeedCommand([profile], library, reference=reference)
     Simulation(
@@ -177,10 +187,10 @@ def measure_wandering(
         rng=np.random.default_rng(0),
         command=following,
     ).run()
-    gaits = [library.at(float(speed)) for speed in library.speeds]
-    planned = np.array([gait.flight.duration for gait in gaits])
+    played = [library.at(float(speed)) for speed in library.speeds]
+    planned = np.array([gait.flight.duration for gait in played])
     memory = following.memory
-    practised = torque_library(learn(machine, gaits, load_controller("ilc"), scenario))
+    practised = torque_library(learn(machine, played, load_controller("ilc"), scenario))
     skills = {
         "none": InitialFeedforward(),
         "practised": InitialFeedforward(practised.torque, practised.flight),
@@ -190,14 +200,14 @@ def measure_wandering(
     for name, skill in skills.items():
         strides = simulate(
             machine,
-            gaits,
+            played,
             replay,
             scenario,
             schedule=_REPLAY,
             rng=np.random.default_rng(0),
             initial=skill,
         )
-        peaks = [mean_peaks(strides, k) for k in range(len(gaits))]
+        peaks = [mean_peaks(strides, k) for k in range(len(played))]
         for joint in COMPARED:
             table[f"{name}_{joint}"] = [float(peak[joint]) for peak in peaks]
     return pd.DataFrame(table)
