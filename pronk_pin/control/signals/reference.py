@@ -10,7 +10,7 @@ import numpy as np
 from ..._checks import SHARE, Interval, keep_reals
 from ..._typing import Array, IntArray
 from ...errors import InvalidInput
-from ...gait import GaitPhase
+from ...gait import GaitPhase, joint_references
 
 LATEST_TOUCHDOWN = 2.0
 """Longest flight, over its planned duration, after which it ends without a touchdown."""
@@ -135,10 +135,16 @@ class Reference:
         self._tabulate(rows[noticed])
 
     def _tabulate(self, rows: IntArray) -> None:
-        for row, end in zip(rows, self.ends(rows), strict=True):
+        if not rows.size:
+            return
+        ends = self.ends(rows)
+        phases = [
+            np.minimum(np.arange(end) * self.timestep / self.duration[row], 1.0)
+            for row, end in zip(rows, ends, strict=True)
+        ]
+        curves = joint_references([self.parts[row] for row in rows], phases)
+        for row, end, s, (position, velocity) in zip(rows, ends, phases, curves, strict=True):
             part, duration = self.parts[row], self.duration[row]
-            s = np.minimum(np.arange(end) * self.timestep / duration, 1.0)
-            position, velocity = part.joint_reference(s)
             velocity[s >= 1.0] = 0.0
             # Past its end a flight holds the posture of touchdown.
             self.phase[row, :end], self.phase[row, end:] = s, s[-1]
