@@ -45,8 +45,8 @@ class Analyze:
     """Strides of learning to compare."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("analysis.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -85,7 +85,8 @@ class Analyze:
                 compare_prediction(spec, strides, speed, scenario, number=self.strides, gait=gait)
             )
             print(describe_prediction(predictions[-1]), end="\n\n")
-        print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
+        if self.figure is not None:
+            print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -140,8 +141,8 @@ class Drive:
     """Speed by which gaits are chosen: commanded, or measured, that of the torso."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("driving.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -159,7 +160,8 @@ class Drive:
             reference=self.reference,
         )
         print(describe_driving(table))
-        print(f"\nfigure  {save_figure(driving_figure(table), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(driving_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -199,8 +201,8 @@ class Gains:
     """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("gains.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -215,7 +217,8 @@ class Gains:
         speeds = self.speed or _covered(self.robot, (-0.4, 0.0, 0.4, 0.8))
         table = sweep_gains(spec, speeds, scenario, robot=self.robot)
         print(describe_gains(table))
-        print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -237,8 +240,8 @@ class Transfer:
     """Scenarios in which the stored feedforward is tried."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("transfer.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -257,7 +260,8 @@ class Transfer:
             robot=self.robot,
         )
         print(describe_transfers(table))
-        print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -274,8 +278,8 @@ class Seeding:
     """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("seeding.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -288,7 +292,8 @@ class Seeding:
         speeds = self.speed or _covered(self.robot, _FINE)
         table = measure_seeding(speeds, load_scenario(self.scenario), robot=self.robot)
         print(describe_seeding(table))
-        print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
+        if self.figure is not None:
+            print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
 
 
 @dataclass(frozen=True)
