@@ -123,7 +123,12 @@ class Stability:
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         speeds = self.speed or _covered(self.robot, self.gaits, (0.6, 0.8))
         table = measure_stability(
-            spec, speeds, scenario, couplings=self.couplings, robot=self.robot
+            spec,
+            speeds,
+            scenario,
+            couplings=self.couplings,
+            robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_stability(table))
 

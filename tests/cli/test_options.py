@@ -97,7 +97,7 @@ def named(argument_name: str, value: str, words: str) -> Case:
 STUDY = "pronk_pin.compare.studies."
 SPEEDS = argument("speeds", (0.2, 0.4, 0.6), "--speed 0.2 0.4 0.6")
 ROBOT = argument("robot", "go1", "--robot go1")
-GAITS = argument("gaits", "bound", "--gaits bound --robot a1")
+GAITS = Case("--gaits GAITS", lambda given: Path(given["gaits"]).name, "mine.npz")
 SCENARIO = named("scenario", "payload", "--scenario payload")
 
 STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
@@ -194,7 +194,7 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
             ),
             "scenario": SCENARIO,
             "robot": Case("--robot go1", lambda given: given["robot"].name, "go1"),
-            "gaits": Case("--gaits bound", lambda given: given["gaits"][0].base, "sagittal"),
+            "gaits": Case("--gaits GAITS", lambda given: len(given["gaits"]), 2),
         },
     ),
 }
@@ -222,11 +222,12 @@ def options_of(*kinds: type) -> set[str]:
     ("study", "option"), [(study, name) for study, (*_, cases) in STUDIES.items() for name in cases]
 )
 def test_an_option_of_a_study_reaches_the_study(
-    study: str, option: str, arguments: Callable[..., Arguments]
+    study: str, option: str, tmp_path: Path, arguments: Callable[..., Arguments]
 ) -> None:
+    some_gaits(tmp_path / "mine.npz", 5, 12)  # from 0 to 0.6 m/s
     _, function, cases = STUDIES[study]
-    case = cases[option]
-    words = [word.replace("0.1_2s", "0.1 2s") for word in split(case.words)]
+    case, places = cases[option], {"GAITS": str(tmp_path / "mine.npz"), "0.1_2s": "0.1 2s"}
+    words = [places.get(word, word) for word in split(case.words)]
     given = arguments(["ilc", study, *words], STUDY + function)
     assert case.found(given) == case.value
     assert case.found(arguments(["ilc", study], STUDY + function)) != case.value
