@@ -264,6 +264,7 @@ class Bench:
 
     def __init__(self, folder: Path, limit: float) -> None:
         self.folder, self.limit = folder, limit
+        folder.chmod(0o755)  # some tests give up the rights of root
         listed = subprocess.check_output(["git", "ls-files", "-z"], cwd=ROOT, text=True)
         for name in filter(None, listed.split("\0")):
             source, target = ROOT / name, folder / name
@@ -293,11 +294,12 @@ class Bench:
         )
         if done.returncode in (0, 5):  # 5: all of them are skipped or slow
             return ""
-        told = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.MULTILINE)
+        told = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, flags=re.MULTILINE)
         return told[0] if told else tests[0]
 
     def notices(self, fault: Fault, *, own: bool) -> str:
-        """What became of a fault: "noticed", "not noticed", or "no answer" in time."""
+        """What became of a fault: "noticed", "not noticed", "no answer" in time, or "fails anyway"
+        where the test that failed does so without it."""
         begin, path = time.monotonic(), self.folder / fault.path
         whole = path.read_bytes()  # which nobody else changes meanwhile
         for tests in stages(fault, own=own):
@@ -309,7 +311,8 @@ class Bench:
             finally:
                 path.write_bytes(whole)
             if failing and self.failing([failing], self.limit):
-                raise SystemExit(f"{failing} fails without any fault; mend it first")
+                print(f"{failing} fails without any fault, too", file=sys.stderr)
+                return "fails anyway"
             if failing:
                 return "noticed"
         return "not noticed"

@@ -436,6 +436,16 @@ def test_what_is_reproduced_are_the_learners_of_the_suite(
     assert set(given["learners"]) == {*names} - {"pd"}
 
 
+def test_what_is_reproduced_is_printed_with_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = SimpleNamespace(folder=tmp_path / "made")
+    monkeypatch.setattr("pronk_pin.compare.run_experiment", lambda *_, **__: made)
+    monkeypatch.setattr(STUDY + "format_reproduction", lambda *_, **__: "the rows")
+    assert main(["reproduce"]) == 0
+    assert capsys.readouterr().out == f"the rows\n\nresults  {made.folder}\n"
+
+
 def drawn(given: Arguments) -> float:
     """The first number that a generator draws."""
     return float(given["rng"].random())

@@ -44,6 +44,18 @@ def curve(axes: Axes, label: str) -> Array:
     return np.column_stack([np.asarray(each, dtype=float) for each in line.get_data()])
 
 
+def reach_of(axes: Axes, controller: str, x: float) -> tuple[float, float]:
+    """Least and greatest height of a controller's band at a place."""
+    (band,) = (
+        each
+        for each in axes.collections
+        if to_rgba(each.get_facecolor()[0])[:3] == to_rgba(look(controller).color)[:3]
+    )
+    corners = band.get_paths()[0].vertices
+    heights = corners[np.isclose(corners[:, 0], x), 1]
+    return float(heights.min()), float(heights.max())
+
+
 def panel(figure: Figure, start: str) -> Axes:
     """The one panel whose title begins so."""
     (found,) = (axes for axes in figure.axes if axes.get_title().startswith(start))
@@ -80,6 +92,7 @@ def test_learning_begins_at_stride_0_of_its_curve(
     for at, drawn in zip(x.astype(int), y, strict=True):
         expected = [peaks[k, first_of_learning(strides["ilc"], k) + at] for k in range(2)]
         assert drawn == pytest.approx(np.mean(expected)), at
+        assert reach_of(axes, "ilc", at) == pytest.approx((min(expected), max(expected))), at
     for controller in ("pd", "model"):
         level = np.mean(
             [
@@ -218,6 +231,9 @@ def test_curves_of_all_scenarios_begin_with_the_first_stride_of_learning() -> No
         assert x.tolist() == list(range(1, 8))
         up = [peaks[0][:7, column], peaks[1][:7, column], peaks[2][:7, column]]
         np.testing.assert_allclose(y, np.mean(up, axis=0))
+        quartiles = np.quantile(up, [0.25, 0.75], axis=0)
+        for k in (1, 4, 7):
+            assert reach_of(axes, "ilc", k) == pytest.approx(tuple(quartiles[:, k - 1]))
         level = curve(axes, look("model").label)[:, 1]
         np.testing.assert_allclose(level, levels[:, column].mean())
 
