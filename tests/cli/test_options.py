@@ -21,7 +21,7 @@ from pronk_pin import cli
 from pronk_pin.cli import main
 from pronk_pin.cli.comparison import ExperimentOptions, Explain, Report, Reproduce, ScheduleOptions
 from pronk_pin.cli.gaits import Build, Plot, Show
-from pronk_pin.cli.ilc import Analyze, Drive, Gains, Seeding, Stability, Transfer, Wander
+from pronk_pin.cli.ilc import Analyze, Drive, Engines, Gains, Seeding, Stability, Transfer, Wander
 from pronk_pin.cli.parity import Parity
 from pronk_pin.cli.view import FilmOptions, View
 from pronk_pin.compare import Experiment, MujocoEngine, Results, Schedule, run_experiment
@@ -97,6 +97,7 @@ def named(argument_name: str, value: str, words: str) -> Case:
 STUDY = "pronk_pin.compare.studies."
 SPEEDS = argument("speeds", (0.2, 0.4, 0.6), "--speed 0.2 0.4 0.6")
 ROBOT = argument("robot", "go1", "--robot go1")
+GAITS = Case("--gaits GAITS", lambda given: Path(given["gaits"]).name, "mine.npz")
 SCENARIO = named("scenario", "payload", "--scenario payload")
 
 STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
@@ -109,6 +110,7 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
             "scenario": SCENARIO,
             "strides": argument("strides", 7, "--strides 7"),
             "robot": ROBOT,
+            "gaits": GAITS,
         },
     ),
     "stability": (
@@ -120,6 +122,7 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
             "scenario": named("scenario", "slope", "--scenario slope"),
             "couplings": argument("couplings", (0.7, 0.1), "--couplings 0.7 0.1"),
             "robot": ROBOT,
+            "gaits": GAITS,
         },
     ),
     "drive": (
@@ -129,8 +132,12 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
             "command": argument("commands", ("0.1 2s",), "--command '0.1 2s'"),
             "controllers": argument("controllers", ("pd", "model"), "--controllers pd model"),
             "scenario": SCENARIO,
-            "reference": argument("reference", "measured", "--reference measured"),
+            "reference": argument(
+                "references", ("measured", "commanded"), "--reference measured commanded"
+            ),
+            "push": argument("push", 5.0, "--push 5"),
             "robot": ROBOT,
+            "gaits": GAITS,
         },
     ),
     "wander": (
@@ -140,6 +147,7 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
             "command": argument("command", "0.1 2s", "--command '0.1 2s'"),
             "scenario": SCENARIO,
             "robot": ROBOT,
+            "gaits": GAITS,
         },
     ),
     "gains": (
@@ -150,6 +158,7 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
             "speed": SPEEDS,
             "scenario": SCENARIO,
             "robot": ROBOT,
+            "gaits": GAITS,
         },
     ),
     "transfer": (
@@ -165,12 +174,28 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
                 ["slope", "delay"],
             ),
             "robot": ROBOT,
+            "gaits": GAITS,
         },
     ),
     "seeding": (
         Seeding,
         "measure_seeding",
-        {"speed": SPEEDS, "scenario": SCENARIO, "robot": ROBOT},
+        {"speed": SPEEDS, "scenario": SCENARIO, "robot": ROBOT, "gaits": GAITS},
+    ),
+    "engines": (
+        Engines,
+        "measure_engine_transfer",
+        {
+            "engines": Case(
+                f"mujoco {TOY}", lambda given: tuple(given["engines"]), ("mujoco", TOY)
+            ),
+            "speed": Case(
+                "--speed 0.2 0.4", lambda given: [gait.speed for gait in given["gaits"]], [0.2, 0.4]
+            ),
+            "scenario": SCENARIO,
+            "robot": Case("--robot go1", lambda given: given["robot"].name, "go1"),
+            "gaits": Case("--gaits GAITS", lambda given: len(given["gaits"]), 2),
+        },
     ),
 }
 ELSEWHERE = {"figure", "result"}
@@ -197,11 +222,12 @@ def options_of(*kinds: type) -> set[str]:
     ("study", "option"), [(study, name) for study, (*_, cases) in STUDIES.items() for name in cases]
 )
 def test_an_option_of_a_study_reaches_the_study(
-    study: str, option: str, arguments: Callable[..., Arguments]
+    study: str, option: str, tmp_path: Path, arguments: Callable[..., Arguments]
 ) -> None:
+    some_gaits(tmp_path / "mine.npz", 5, 12)  # from 0 to 0.6 m/s
     _, function, cases = STUDIES[study]
-    case = cases[option]
-    words = [word.replace("0.1_2s", "0.1 2s") for word in split(case.words)]
+    case, places = cases[option], {"GAITS": str(tmp_path / "mine.npz"), "0.1_2s": "0.1 2s"}
+    words = [places.get(word, word) for word in split(case.words)]
     given = arguments(["ilc", study, *words], STUDY + function)
     assert case.found(given) == case.value
     assert case.found(arguments(["ilc", study], STUDY + function)) != case.value
@@ -213,7 +239,7 @@ def test_every_option_of_a_study_has_its_case() -> None:
         assert set(cases) <= options_of(kind), kind
 
 
-@pytest.mark.parametrize("study", sorted(set(STUDIES) - {"stability", "wander"}))
+@pytest.mark.parametrize("study", sorted(set(STUDIES) - {"engines", "stability", "wander"}))
 def test_the_figure_of_a_study_is_written_where_it_is_asked_for(
     study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -229,7 +255,10 @@ def test_the_figure_of_a_study_is_written_where_it_is_asked_for(
     studies = importlib.import_module("pronk_pin.compare.studies")
     for name in [name for name in dir(studies) if name.startswith("describe_")]:
         monkeypatch.setattr(studies, name, lambda _: "in words")
-    monkeypatch.setattr(studies, function, lambda *_, **__: "table")
+    driving = SimpleNamespace(summary="summary", strides="table")
+    found = driving if study == "drive" else "table"
+    monkeypatch.setattr("pronk_pin.compare.report.format_commands", lambda _: "in words")
+    monkeypatch.setattr(studies, function, lambda *_, **__: found)
     monkeypatch.setattr(studies, "compare_prediction", lambda *_, **__: "table")
     monkeypatch.setattr(f"pronk_pin.viz.figures.{drawing}", lambda table: ("drawn", table))
     saved: list[object] = []
@@ -289,6 +318,12 @@ COMPARE: Mapping[str, Case] = {
     "scenarios": experiment("scenario_names", ("payload", "slope"), "--scenarios payload slope"),
     "seeds": experiment("seeds", (3, 5), "--seeds 3 5"),
     "base": experiment("base", "sagittal", "--base sagittal --controllers pd"),
+    "commands": Case(
+        "--command 0.1_2s 0->0.3_1s",
+        lambda given: asked(given).commands,
+        ("0.1 2s", "0->0.3 1s"),
+    ),
+    "reference": experiment("reference", "measured", "--command 0.1_2s --reference measured"),
     "engine": Case(
         f"--engine {TOY}",
         lambda given: [asked(given).scenario(name).engine for name in asked(given).scenario_names],
@@ -346,6 +381,7 @@ def test_an_option_of_compare_reaches_the_run(
     }
     case = COMPARE[option]
     words = [places.get(word, word) for word in case.words.split()]
+    words = [word.replace("_2s", " 2s").replace("_1s", " 1s") for word in words]
     target = "pronk_pin.compare.run_experiment"
     assert case.found(arguments(["compare", *words], target)) == case.value
     assert case.found(arguments(["compare"], target)) != case.value
@@ -711,7 +747,8 @@ def test_an_option_of_films_reaches_picture_and_film(
 
 def test_every_option_of_view_has_its_case() -> None:
     files = {"what", "html", "png", "gif", "mp4", "film"}
-    assert {*VIEW_GAITS, *VIEW_RESULT, *files} == options_of(View)
+    # A command is of results of commanded speeds: tests/viz/player/test_commands_shown.py.
+    assert {*VIEW_GAITS, *VIEW_RESULT, *files, "command"} == options_of(View)
     assert set(FILMS) == options_of(FilmOptions)
 
 

@@ -54,6 +54,22 @@ def test_the_report_answers_first_and_says_where_its_numbers_are_from(result: Re
     assert "nan" not in re.sub(r"data:image[^\"]*|provenance", "", text)
 
 
+def test_the_report_leads_to_what_is_in_its_folder(result: Results, tmp_path: Path) -> None:
+    """To the replay only where there is one, and from each scenario to its own robots."""
+    assert "replay.html" not in (result.folder / "report.html").read_text()
+    copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
+    (copy.folder / "replay.html").write_text("a replay")
+    write_report(copy)
+    text = (copy.folder / "report.html").read_text()
+    addresses = set(re.findall(r'href="([^"#]+)(?:#[^"]*)?"', text))
+    assert addresses == {"replay.html", "summary.csv", "strides/", "figures/"}
+    for address in addresses:
+        assert (copy.folder / address).exists()
+    for scenario in EXPERIMENT.scenario_names:
+        assert f'href="replay.html#scenario={scenario}"' in text
+    assert re.search(r'<a href="replay.html#[^"]+"><img', text)
+
+
 def test_the_control_arm_learns_no_torque_and_shows_what_its_timing_does(result: Results) -> None:
     """All the machinery with gain 0: before the learning it is PD to the bit, then PD timed."""
     strides = {
