@@ -88,7 +88,7 @@ class View:
         """Do it."""
         from .._checks import NOT_NEGATIVE, none_or, real, whole
         from ..viz import Film, serve, write_film, write_png, write_replay
-        from ..viz.player import DURATION, known_port
+        from ..viz.player import DURATION, check_film, known_port
 
         film = Film(**self.film)
         known_port(self.port)
@@ -96,6 +96,9 @@ class View:
         for name in ("speed", "apex"):
             none_or(real, name, getattr(self, name))
         none_or(whole, "stride", self.stride, NOT_NEGATIVE)
+        for path in (self.png, self.gif, self.mp4):
+            if path is not None:
+                check_film(path)  # what is missing is told before anything is read or drawn
         menu = self._menu()
         if self.html is not None:
             print(f"replay  {write_replay(menu, self.html)}")
