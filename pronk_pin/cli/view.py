@@ -54,8 +54,9 @@ class View:
     scenario: str | None = None
     """Scenario of a result; by default the first."""
     beside: str | None = None
-    """Robot to show beside it: another controller of the result, or 'before learning'; by
-    default none."""
+    """Robot to show beside it: another controller of the result, 'PD and the model', 'before
+    learning', or 'nothing'; by default PD and the model, as far as the result has them, beside
+    one that learns."""
     stride: int | None = None
     """Show the dozen strides of a result with this one; by default those around the start of
     learning."""

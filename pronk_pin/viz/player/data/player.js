@@ -583,6 +583,9 @@ class Player {
     document.querySelectorAll("[data-view]").forEach((button) => {
       button.addEventListener("click", () => this.look(button.dataset.view));
     });
+    for (const kind of ["pointerdown", "mousedown", "touchstart"]) {  // not for turning the view
+      $("views").addEventListener(kind, (event) => event.stopPropagation());
+    }
     $("follow").addEventListener("click", () => this.follow(!this.following));
     $("full").addEventListener("click", () => document.fullscreenElement
       ? document.exitFullscreen() : document.documentElement.requestFullscreen());
@@ -746,6 +749,7 @@ class Player {
     this.ground.material.color.set(film.soft ? SOFT : FIRM);
     this.learned();
     this.legend();
+    this.timeline.draw();  // it takes room from the pane
     if (this.solid !== before) this.look();  // the rest of the time the camera is the reader's
     this.fit();
     this.seek(this.time);
