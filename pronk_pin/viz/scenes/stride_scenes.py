@@ -155,7 +155,8 @@ class _Reader:
                 continue
             whole = self._strides(other, scenario, speed)
             cut = _same(whole, shown) if choice[STRIDES] == START else _cut(whole, choice[STRIDES])
-            cuts.append((f"{look(other).label}, beside", other, cut, whole))
+            label = look(other).label + ("" if beside == RIVALS else ", beside")
+            cuts.append((label, other, cut, whole))
         tracks: list[Track] = []
         for place, (label, other, cut, whole) in enumerate(cuts):
             # Robots side by side are told apart by the colours that figures have for them.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -9,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from pronk_pin.viz import LiveServer, Menu, Scene, Track, write_replay
 from pronk_pin.viz.scenes import History
@@ -221,6 +224,23 @@ def test_the_camera_stays_above_the_floor_and_comes_back(page: str, browser: Eye
     assert browser.run("$('follow').getAttribute('aria-pressed')") == "false"
     browser.run("$('follow').click(); player.draw()")
     assert browser.run(place) < fixed - 1.0
+
+
+def test_a_picture_of_this_view_is_saved_as_a_file(page: str, browser: Eye) -> None:
+    browser.open(f"{page}#t=0.3")
+    browser.run("HTMLAnchorElement.prototype.click = function () { window.saved = this; }")
+    left, top, width, height = corners(browser, "snap")
+    point = {"x": left + width / 2, "y": top + height / 2, "button": "left", "clickCount": 1}
+    for kind in ("mousePressed", "mouseReleased"):
+        browser.call("Input.dispatchMouseEvent", type=kind, **point)
+    browser.wait("window.saved !== undefined")
+    assert browser.run("window.saved.download") == "Hop-0.30s.png"
+    data = browser.run("window.saved.href").removeprefix("data:image/png;base64,")
+    saved = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")).astype(int)
+    pane = corners(browser, "pane")
+    assert saved.shape[:2] == (round(pane[3]), round(pane[2]))
+    seen = browser.look()[250:500, 100:500]  # where no words are
+    assert np.abs(saved[250:500, 100:500] - seen).mean() < 1.0
 
 
 def test_keys_work_after_a_click_on_a_box_or_the_scrubber(page: str, browser: Eye) -> None:

@@ -107,7 +107,7 @@ def test_the_question_is_shown_first_practice_beside_pd_and_the_model(results: R
     """The same strides side by side, in the colours of the figures, with their errors."""
     scene = result_menu(results).scene()
     robots = [track for track in scene.tracks if not track.ghost]
-    assert [track.name for track in robots] == ["ILC", "PD, beside", "PD + model, beside"]
+    assert [track.name for track in robots] == ["ILC", "PD", "PD + model"]
     assert [track.q[0, 1] for track in robots] == pytest.approx([0.0, 0.55, 1.1])
     assert len({track.color for track in scene.tracks}) == 4  # and the references' own
     numbers = [[mark.stride for mark in track.marks] for track in robots]

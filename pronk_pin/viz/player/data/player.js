@@ -593,7 +593,8 @@ class Player {
     $("drawer").addEventListener("click", () => {
       const open = document.body.classList.toggle("open");
       $("drawer").setAttribute("aria-expanded", open);
-      this.fit();
+      this.plots.forEach((plot) => plot.draw());  // they had no size
+      this.dirty = true;
     });
     $("timeline").addEventListener("click", (event) => this.timeline.jump(event));
     $("timeline").addEventListener("pointermove", (event) => this.timeline.tell(event));
