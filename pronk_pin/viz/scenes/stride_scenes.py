@@ -65,7 +65,8 @@ def result_menu(
     Args:
         results: The results folder.
         speed: Desired speed shown first [m/s]; by default the one nearest to 0.5.
-        controller: Controller shown first; by default "ilc", or the first there is.
+        controller: Controller shown first; by default "ilc", or the first that learns, or
+            the first.
         scenario: Scenario shown first; by default the first.
         beside: What runs beside it: a controller, "before learning" for its own strides before
             the learning was switched on, "PD and the model", or "nothing". By default whichever of
@@ -80,7 +81,8 @@ def result_menu(
     experiment = instance_of("results", results, Results).experiment
     speeds, controllers = list(experiment.speeds), list(experiment.controller_names)
     if controller is None:
-        controller = "ilc" if "ilc" in controllers else controllers[0]
+        learners = [name for name in controllers if any(experiment.controller(name).laws)]
+        controller = "ilc" if "ilc" in controllers else [*learners, *controllers][0]
     scenario = experiment.scenario_names[0] if scenario is None else scenario
     at = None if speed is None else nearest(speeds, speed, "speed")
     strides = results.all_strides(controller=controller, scenario=scenario)
@@ -148,12 +150,16 @@ class _Reader:
         strides = self._strides(name, scenario, speed)
         shown = _cut(strides, choice[STRIDES])
         others = [other for other in _RIVALS if other != name] if beside == RIVALS else [beside]
+        fallen: list[str] = []
         cuts = [(look(name).label, name, shown, strides)]
         for other in others if beside != ALONE else []:
             if other == EARLIER:
                 cuts.append((EARLIER, "", _cut_before(strides), strides))
                 continue
             whole = self._strides(other, scenario, speed)
+            if beside == RIVALS and int(whole["count"]) == 0:
+                fallen.append(look(other).label)  # before its first stride had ended
+                continue
             cut = _same(whole, shown) if choice[STRIDES] == START else _cut(whole, choice[STRIDES])
             label = look(other).label + ("" if beside == RIVALS else ", beside")
             cuts.append((label, other, cut, whole))
@@ -169,7 +175,10 @@ class _Reader:
         learned = shown["start"].to_numpy()[shown["learning"].to_numpy() == 1]
         began = float(learned[0] - shown["start"][0]) if learned.size else 0.0
         note = f"; learning starts after {began:.1f} s" if began > 0.0 else ""
-        note += "; the robot fell" if bool((shown["upright"] == 0).any()) else ""
+        fell = [label for label, _, cut, _ in cuts if bool((cut["upright"] == 0).any())]
+        fallen = [*fell, *(f"{label} at once" for label in fallen)]
+        if fallen:
+            note += f"; fell: {', '.join(fallen)}" if len(cuts) > 1 else "; the robot fell"
         return Scene(
             robot,
             tracks,

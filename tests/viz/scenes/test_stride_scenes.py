@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from pronk_pin.compare import Experiment, Results, run_experiment
 from pronk_pin.compare.simulation.schedule import Schedule
 from pronk_pin.errors import InvalidInput
 from pronk_pin.viz.report import scenario_figures
+from pronk_pin.viz.scenes import stride_scenes
 from pronk_pin.viz.scenes.stride_scenes import result_menu
 
 
@@ -125,6 +128,32 @@ def test_the_question_is_shown_first_practice_beside_pd_and_the_model(results: R
         assert (history.began is None) == (name != "ilc")
     ilc, pd, model = (track.history.errors["calf"][-1] for track in robots)  # type: ignore[union-attr]
     assert ilc < model < pd
+
+
+def test_a_rival_without_a_stride_is_left_out_and_named(
+    results: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load = stride_scenes._Reader._strides
+
+    def strides(self: Any, controller: str, scenario: str, speed: float) -> xr.Dataset:
+        found = load(self, controller, scenario, speed)
+        return found.assign(count=0 * found["count"]) if controller == "pd" else found
+
+    monkeypatch.setattr(stride_scenes._Reader, "_strides", strides)
+    scene = result_menu(results).scene()
+    assert [track.name for track in scene.tracks if not track.ghost] == ["ILC", "PD + model"]
+    assert scene.caption.endswith("fell: PD at once")
+
+
+def test_what_learns_is_shown_first_whatever_it_is_called(tmp_path: Path) -> None:
+    experiment = Experiment(
+        speeds=(0.0,),
+        controllers=("pd", "ilc-stance"),
+        schedule=Schedule(baseline=2.0, learning=2.0),
+    )
+    made = run_experiment(experiment, tmp_path / "own", workers=1, progress=False)
+    first = result_menu(made).first
+    assert (first["controller"], first["beside it"]) == ("ilc-stance", "pd")
 
 
 def test_a_file_holds_each_scenario_and_controller_before_their_combinations(
