@@ -64,6 +64,14 @@ class ExperimentOptions(TypedDict, total=False):
     """What happens when."""
     metrics: Annotated[tuple[str, ...], arg(metavar="[MODULE:OBJECT [...]]")]
     """Metrics of your own, beside those of `pronk-pin list metrics`; by default none."""
+    commands: Annotated[tuple[str, ...], arg(name="command", metavar="[PROFILE|FILE [...]]")]
+    """Speeds that change, instead of constant ones, each in quotes: "0 4s, 0->0.8 2s, 0.8 4s", a
+    speed [m/s] and how long, or two with an arrow; "0.3+-0.2/5s 20s", a sine; or a csv file of time
+    and speed. What was learned, or computed, at the speeds is used in between; speeds are by
+    default those of the gait library that the commands span. By default none."""
+    reference: str
+    """With commands, speed by which gaits are chosen: commanded, or measured, that of the torso; by
+    default commanded."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +109,8 @@ class Compare:
         given: dict[str, Any] = {**self.options}
         # Speeds and controllers begin with those of the robot and its gaits.
         first = {name: given[name] for name in ("robot", "gaits", "base") if name in given}
+        if given.get("commands"):
+            given.setdefault("speeds", ())  # those that the commands span
         begun = load_suite(self.suite or "default", **first)
         if self.config is not None:
             begun = read_config(self.config)
@@ -131,6 +141,8 @@ class Compare:
                 mjcf=experiment.mjcf,
                 schedule=schedule,
                 metrics=tuple(map(name_of, experiment.metrics)),
+                commands=experiment.commands,
+                reference=experiment.reference,
             ),
         )
 
@@ -267,6 +279,7 @@ class Explain:
 
         self._check()
         results = Results.load(self.result)
+        results.check_constant("explain")
         if self.speed is not None:
             nearest(results.experiment.speeds, self.speed, "speed")
         cell = results.find(controller=self.controller, scenario=self.scenario)
@@ -317,6 +330,7 @@ def command_line(experiment: Experiment) -> str:
     own = (experiment.robot, experiment.gaits, *experiment.controllers, *experiment.scenarios)
     if experiment.metrics or not all(isinstance(value, str) for value in own):
         return "pronk-pin compare --config config.json"
+    driven = bool(experiment.commands)
     words += [f"--robot {experiment.robot_name}"]
     words += [f"--gaits {experiment.gaits}"] if experiment.gaits != "pronk" else []
     words += [f"--apex {experiment.apex:g}"] if experiment.apex is not None else []
@@ -326,6 +340,8 @@ def command_line(experiment: Experiment) -> str:
     words += ["--seeds " + " ".join(map(str, experiment.seeds))]
     words += [f"--base {experiment.base}"]
     words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []
+    words += ["--command " + " ".join(map(shlex.quote, experiment.commands))] * driven
+    words += [f"--reference {experiment.reference}"] * driven
     schedule = experiment.schedule
     words += [
         f"--schedule.{name} {getattr(schedule, name):g}"

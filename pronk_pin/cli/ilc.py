@@ -15,12 +15,11 @@ _FINE = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
 """Speeds [m/s] of studies that need neighbours."""
 
 
-def _covered(robot: str, speeds: tuple[float, ...]) -> tuple[float, ...]:
-    """Those of some speeds [m/s] that the gaits shipped for a robot cover."""
-    from ..gait import load_library
-    from ..robot import load_robot
+def _covered(robot: str, gaits: str, speeds: tuple[float, ...]) -> tuple[float, ...]:
+    """Those of some speeds [m/s] that the gaits of a robot cover."""
+    from ..compare.studies import machine_and_gaits
 
-    covered = load_library(load_robot(robot).name).speeds
+    covered = machine_and_gaits(robot, gaits)[1].speeds
     return tuple(speed for speed in speeds if covered[0] <= speed <= covered[-1])
 
 
@@ -45,6 +44,8 @@ class Analyze:
     """Strides of learning to compare."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
     figure: Path | None = None
     """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
@@ -56,6 +57,7 @@ class Analyze:
             STRIDES,
             compare_prediction,
             describe_prediction,
+            machine_and_gaits,
             simulate_learning,
             stored_learning,
         )
@@ -65,12 +67,14 @@ class Analyze:
 
         whole("strides", self.strides, STRIDES)
         known_figure(self.figure)
-        gaits: list[Gait] | None = None  # those that are shipped
+        gaits: list[Gait]
         if self.result is None:
             spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
             strides = simulate_learning(
-                spec, self.speed, scenario, robot=self.robot, strides=self.strides
+                spec, self.speed, scenario, robot=self.robot, gaits=self.gaits, strides=self.strides
             )
+            _, library = machine_and_gaits(self.robot, self.gaits)
+            gaits = [library.at(speed) for speed in self.speed]
         else:
             results = Results.load(self.result)
             experiment = results.experiment
@@ -80,10 +84,10 @@ class Analyze:
             gaits = experiment.planned_at(self.speed)
         predictions = []
         for k, speed in enumerate(self.speed):
-            gait = None if gaits is None else gaits[k]
-            predictions.append(
-                compare_prediction(spec, strides, speed, scenario, number=self.strides, gait=gait)
+            compared = compare_prediction(
+                spec, strides, speed, scenario, number=self.strides, gait=gaits[k]
             )
+            predictions.append(compared)
             print(describe_prediction(predictions[-1]), end="\n\n")
         if self.figure is not None:
             print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
@@ -107,6 +111,8 @@ class Stability:
     """Shares of the stance's errors that the flight's law is shown."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
 
     def run(self) -> None:
         """Do it."""
@@ -115,9 +121,14 @@ class Stability:
         from ..control import load_controller
 
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
-        speeds = self.speed or _covered(self.robot, (0.6, 0.8))
+        speeds = self.speed or _covered(self.robot, self.gaits, (0.6, 0.8))
         table = measure_stability(
-            spec, speeds, scenario, couplings=self.couplings, robot=self.robot
+            spec,
+            speeds,
+            scenario,
+            couplings=self.couplings,
+            robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_stability(table))
 
@@ -132,36 +143,46 @@ class Drive:
     command: tuple[str, ...] = ()
     """Speed profiles, each in quotes: "0 4s, 0->0.8 2s, 0.8 4s", a speed [m/s] and how long, or two
     with an arrow. Where a piece begins at another speed than the last ended, the command steps. By
-    default ramps and steps up and down."""
+    default ramps and steps up and down. A csv file of time and speed is one, too."""
     controllers: tuple[str, ...] = ("pd", "model", "library", "library+ilc")
     """Controllers."""
     scenario: str = "nominal"
     """Scenario, of the learning and of the driving."""
-    reference: str = "commanded"
-    """Speed by which gaits are chosen: commanded, or measured, that of the torso."""
+    reference: tuple[str, ...] = ("commanded",)
+    """Speeds by which gaits are chosen: commanded, or measured, that of the torso; or both."""
+    push: float = 0.0
+    """Impulse of a push forward, once, after three fifths of the longest command [N s]; with one
+    the default commands are constant speeds."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
     figure: Path | None = None
     """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
+        from .._checks import Interval, real
         from ..compare import load_scenario
-        from ..compare.studies import RAMPS, describe_driving, measure_driving
+        from ..compare.report import format_commands
+        from ..compare.studies import PUSHED, RAMPS, measure_driving
         from ..viz import known_figure, save_figure
         from ..viz.figures import driving_figure
 
         known_figure(self.figure)
-        table = measure_driving(
-            self.command or RAMPS,
+        real("push", self.push, Interval(-200, 200, "N s"))
+        driving = measure_driving(
+            self.command or (PUSHED if self.push else RAMPS),
             load_scenario(self.scenario),
             controllers=self.controllers,
             robot=self.robot,
-            reference=self.reference,
+            gaits=self.gaits,
+            references=self.reference,
+            push=self.push,
         )
-        print(describe_driving(table))
+        print(format_commands(driving.summary))
         if self.figure is not None:
-            print(f"\nfigure  {save_figure(driving_figure(table), self.figure)}")
+            print(f"\nfigure  {save_figure(driving_figure(driving.strides), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -175,6 +196,8 @@ class Wander:
     """Scenario."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
 
     def run(self) -> None:
         """Do it."""
@@ -182,7 +205,7 @@ class Wander:
         from ..compare.studies import SWEEPS, describe_wandering, measure_wandering
 
         command, scenario = self.command or SWEEPS, load_scenario(self.scenario)
-        table = measure_wandering(command, scenario, robot=self.robot)
+        table = measure_wandering(command, scenario, robot=self.robot, gaits=self.gaits)
         print(describe_wandering(table))
 
 
@@ -201,6 +224,8 @@ class Gains:
     """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
     figure: Path | None = None
     """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
@@ -214,8 +239,8 @@ class Gains:
 
         known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
-        speeds = self.speed or _covered(self.robot, (-0.4, 0.0, 0.4, 0.8))
-        table = sweep_gains(spec, speeds, scenario, robot=self.robot)
+        speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
+        table = sweep_gains(spec, speeds, scenario, robot=self.robot, gaits=self.gaits)
         print(describe_gains(table))
         if self.figure is not None:
             print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
@@ -240,6 +265,8 @@ class Transfer:
     """Scenarios in which the stored feedforward is tried."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
     figure: Path | None = None
     """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
@@ -254,10 +281,11 @@ class Transfer:
         known_figure(self.figure)
         table = measure_transfers(
             load_controller(self.controller),
-            self.speed or _covered(self.robot, _FINE),
+            self.speed or _covered(self.robot, self.gaits, _FINE),
             load_scenario(self.scenario),
             [load_scenario(name) for name in self.scenarios],
             robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_transfers(table))
         if self.figure is not None:
@@ -278,6 +306,8 @@ class Seeding:
     """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
     figure: Path | None = None
     """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
@@ -289,8 +319,10 @@ class Seeding:
         from ..viz.figures import errors_by_seed
 
         known_figure(self.figure)
-        speeds = self.speed or _covered(self.robot, _FINE)
-        table = measure_seeding(speeds, load_scenario(self.scenario), robot=self.robot)
+        speeds = self.speed or _covered(self.robot, self.gaits, _FINE)
+        table = measure_seeding(
+            speeds, load_scenario(self.scenario), robot=self.robot, gaits=self.gaits
+        )
         print(describe_seeding(table))
         if self.figure is not None:
             print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
@@ -312,17 +344,20 @@ class Engines:
     """Scenario."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
 
     def run(self) -> None:
         """Do it."""
         from ..compare import load_scenario
-        from ..compare.studies import describe_engine_transfer, measure_engine_transfer
-        from ..gait import load_library
-        from ..robot import load_robot
+        from ..compare.studies import (
+            describe_engine_transfer,
+            machine_and_gaits,
+            measure_engine_transfer,
+        )
 
-        robot = load_robot(self.robot)
-        library = load_library(robot.name)
-        speeds = self.speed or _covered(self.robot, (-0.4, 0.0, 0.4, 0.8))
+        speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
+        robot, library = machine_and_gaits(self.robot, self.gaits)
         gaits = [library.at(speed) for speed in speeds]
         table = measure_engine_transfer(robot, gaits, load_scenario(self.scenario), self.engines)
         print(describe_engine_transfer(table))

@@ -47,6 +47,8 @@ class View:
     """Results folder or gait library; by default the shipped gaits."""
     speed: float | None = None
     """Speed [m/s]; by default the one nearest to 0.5."""
+    command: str | None = None
+    """Speed profile of a result of commanded speeds; by default the first."""
     apex: float | None = None
     """Apex of a gait library [m]; by default the library's own."""
     controller: str | None = None
@@ -140,6 +142,7 @@ class View:
                 scenario=self.scenario,
                 beside=self.beside,
                 stride=self.stride,
+                command=self.command,
             )
         if self.what is not None and not self.what.exists() and self.what.suffix != ".npz":
             raise FileProblem(
@@ -148,7 +151,7 @@ class View:
                 "make the one with 'pronk-pin compare --folder', the other with 'pronk-pin gaits "
                 "build --output'",
             )
-        self._refuse(("controller", "scenario", "beside", "stride"), "a results folder")
+        self._refuse(("command", "controller", "scenario", "beside", "stride"), "a results folder")
         library = open_library(self.what, self.robot, self.gait, self.base)
         return library_menu(
             library, speed=self.speed, apex=self.apex, robot=robot_of(library, self.robot)

@@ -43,6 +43,8 @@ class _Document:
     engine: str | None = None
     schedule: Schedule | None = None
     metrics: tuple[str | dict[str, Any], ...] | None = None
+    commands: tuple[str, ...] | None = None
+    reference: str | None = None
     batches: tuple[tuple[float, ...], ...] | None = None
 
 
@@ -51,8 +53,9 @@ def to_document(experiment: Experiment) -> dict[str, Any]:
     whole = {part.name: getattr(experiment, part.name) for part in dataclasses.fields(experiment)}
     del whole["engine"]  # it stands in the scenarios
     own = not isinstance(experiment.gaits, str)
+    constant = () if experiment.commands else ("commands", "reference")
     return {
-        **whole,
+        **{name: value for name, value in whole.items() if name not in constant},
         "robot": describe(experiment.robot),
         "gaits": GAITS if own else experiment.gaits,
         "controllers": describe(experiment.controllers),
@@ -90,6 +93,11 @@ def from_document(document: object, path: Path, remedy: str) -> Experiment:
         value = fields.get(name)
         if isinstance(value, str) and value and (path.parent / value).is_file():
             fields[name] = str(path.parent / value)
+    if known.commands is not None:
+        fields["commands"] = tuple(
+            str(path.parent / words) if words.endswith(".csv") else words
+            for words in known.commands
+        )
     return Experiment(**fields)
 
 

@@ -212,6 +212,8 @@ class Simulation:
             tape, record = controller.liftoff(
                 rows, measured_log, self._commanded(rows, start + stance)
             )
+        if self._command is not None:
+            strides["landing_speed"][rows, strides.count[rows]] = self._command.speed[rows]
         if player.sensed is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, sensed=late))
         strides.stance(rows, record, log, stance)
@@ -265,6 +267,7 @@ def simulate(
     attributes: Mapping[str, str | int | float] | None = None,
     progress: Progress | None = None,
     control_time: ControlTime | None = None,
+    command: SpeedCommand | None = None,
 ) -> xr.Dataset:
     """Simulate robots under one controller in one scenario, and label their strides.
 
@@ -280,6 +283,7 @@ def simulate(
         attributes: Attributes of the dataset; by default the name of the robot.
         progress: Called with the number of time steps done since the last call.
         control_time: Takes how long the controller computed.
+        command: Commanded speeds, see `Simulation`.
 
     Returns:
         The strides, see `to_dataset`.
@@ -295,9 +299,10 @@ def simulate(
         feedforward=initial.feedforward,
         flight=initial.flight,
         base=base,
+        command=command,
     )
     attributes = {"robot": robot.name} if attributes is None else attributes
     log = simulation.run(progress)
     if control_time is not None:
         control_time.add(simulation.control_time)
-    return to_dataset(log, robot, gaits, attributes=attributes)
+    return to_dataset(log, robot, gaits, attributes=attributes, command=command)

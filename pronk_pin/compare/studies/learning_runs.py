@@ -11,8 +11,9 @@ import xarray as xr
 from ..._checks import reals
 from ...control import ControllerSpec, LearningLaw
 from ...errors import InvalidInput
-from ...gait import Gait
-from ...robot import JOINTS, Robot
+from ...gait import Gait, GaitLibrary
+from ...robot import JOINTS, Robot, RobotSpec
+from ..experiment import Experiment
 from ..metrics import STEADY_STRIDES
 from ..simulation import Progress, Schedule, simulate
 from ..world import Scenario
@@ -21,7 +22,20 @@ COMPARED = ("thigh", "calf")
 """Joints whose errors are compared."""
 
 # At 0.8 m/s it takes 20 s until the touchdown stays at one tick.
-_LONG = Schedule(0.5, 4.0, 28.0)
+LONG = Schedule(0.5, 4.0, 28.0)
+"""Baseline and learning until the touchdowns have settled."""
+
+
+def machine_and_gaits(
+    robot: str | RobotSpec, gaits: str | GaitLibrary
+) -> tuple[Robot, GaitLibrary]:
+    """A robot and its gaits, each given as an `Experiment` takes it.
+
+    Raises:
+        PronkError: What `Experiment` raises.
+    """
+    experiment = Experiment(robot=robot, gaits=gaits, controllers=("pd",))
+    return experiment.model, experiment.library
 
 
 def learning_law(spec: ControllerSpec) -> LearningLaw:
@@ -61,7 +75,7 @@ def learn(
 ) -> xr.Dataset:
     """Learn until the touchdowns have settled; the strides, of which a torque library is made."""
     rng = np.random.default_rng(0)
-    return simulate(robot, gaits, spec, scenario, schedule=_LONG, rng=rng, progress=progress)
+    return simulate(robot, gaits, spec, scenario, schedule=LONG, rng=rng, progress=progress)
 
 
 def peaks_by_stride(strides: xr.Dataset) -> pd.DataFrame:

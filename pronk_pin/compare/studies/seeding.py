@@ -9,14 +9,20 @@ import pandas as pd
 
 from ..._typing import Array
 from ...control import ControllerSpec, InitialFeedforward, TorqueLibrary, load_controller
-from ...gait import Gait, load_library
-from ...robot import Robot, load_robot
+from ...gait import Gait, GaitLibrary
+from ...robot import Robot, RobotSpec
 from ..experiment import initial_feedforward, torque_library
 from ..metrics import STEADY_STRIDES, settling_stride
 from ..report import number
 from ..simulation import Schedule, simulate
 from ..world import Scenario
-from .learning_runs import COMPARED, learn, peaks_by_stride, speeds_with_neighbours
+from .learning_runs import (
+    COMPARED,
+    learn,
+    machine_and_gaits,
+    peaks_by_stride,
+    speeds_with_neighbours,
+)
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")
 """The same laws, from nothing, from the model's feedforward, and from the torque library."""
@@ -27,7 +33,11 @@ _WORDS = {"none": "nothing", "model": "the model", "library": "the library"}
 
 
 def measure_seeding(
-    speeds: Sequence[float], scenario: Scenario, *, robot: str = "a1"
+    speeds: Sequence[float],
+    scenario: Scenario,
+    *,
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
 ) -> pd.DataFrame:
     """Learn at the inner speeds from each initial feedforward; the library holds the others only.
 
@@ -35,7 +45,8 @@ def measure_seeding(
         speeds: Increasing speeds [m/s], three or more. The library is learned at all of them,
             and each inner one begins with what its neighbours learned.
         scenario: The scenario.
-        robot: Short name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
 
     Returns:
         A row for each controller of `LEARNERS`, speed and stride: `controller`, `speed`, `stride`
@@ -46,10 +57,11 @@ def measure_seeding(
         InvalidInput: There are fewer than three speeds, or they do not increase.
     """
     speeds = speeds_with_neighbours("seeding", speeds)
-    machine, gaits_ = load_robot(robot), load_library(robot)
-    gaits = [gaits_.at(speed) for speed in speeds]
+    machine, library = machine_and_gaits(robot, gaits)
+    learned = [library.at(speed) for speed in speeds]
     specs = [load_controller(name) for name in LEARNERS]
-    stored, inner = torque_library(learn(machine, gaits, specs[0], scenario)), gaits[1:-1]
+    inner = learned[1:-1]
+    stored = torque_library(learn(machine, learned, specs[0], scenario))
     tables = []
     for spec in specs:
         strides = simulate(

@@ -47,6 +47,7 @@ from ...errors import cannot_write
 from .. import figures
 from ..figure_style import save_figure
 from . import report_tables
+from .command_report import add_commands, command_figures
 from .document import Document
 
 SHOWN_SPEED = 0.3
@@ -118,6 +119,8 @@ def write_report(results: Results, *, command: str = "") -> Path:
 
 def report(results: Results, *, command: str = "") -> Document:
     """The report as a document, see `write_report`."""
+    if results.experiment.commands:
+        return _of_commands(results, command)
     summary, scenarios = results.summary(), families(results.experiment.scenario_names)
     document = Document(f"Does practice beat the model? {results.experiment.robot_name.upper()}")
     tables = answer(summary)
@@ -134,6 +137,19 @@ def report(results: Results, *, command: str = "") -> Document:
         _foreign_robot(document, results.foreign)
     document.heading("How to read the numbers", "statistics")
     document.text(_READING)
+    document.heading("Known limitations", "limits")
+    document.bullets(limitations(results))
+    _provenance(document, results, command)
+    return document
+
+
+def _of_commands(results: Results, command: str) -> Document:
+    """The report of commanded speeds."""
+    name = results.experiment.robot_name.upper()
+    document = Document(f"Does practice hold while the speed changes? {name}")
+    add_commands(document, results)
+    if results.foreign is not None:
+        _foreign_robot(document, results.foreign)
     document.heading("Known limitations", "limits")
     document.bullets(limitations(results))
     _provenance(document, results, command)
@@ -219,6 +235,8 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     Raises:
         FileProblem: The folder cannot be written, or the result is damaged.
     """
+    if results.experiment.commands:
+        return _written(command_figures(results), folder)
     figures_by_name = scenario_figures(results, results.experiment.scenario_names[0])
     if len(families(results.experiment.scenario_names)) > 1:
         figures_by_name |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
@@ -226,6 +244,10 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
         worlds = results.experiment.scenarios
         table = sampled_scenarios(results.summary(), scenario=world, worlds=worlds)
         figures_by_name[f"{world}-by-world"] = figures.by_scenario(table)
+    return _written(figures_by_name, folder)
+
+
+def _written(figures_by_name: Mapping[str, Figure], folder: Path) -> list[Path]:
     return [
         save_figure(figure, folder / f"{name}.{suffix}")
         for name, figure in figures_by_name.items()

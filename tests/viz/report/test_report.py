@@ -236,7 +236,7 @@ def test_sampled_worlds_are_one_family_and_each_has_its_line(tmp_path: Path) -> 
         speeds=(0.2,),
         controllers=("pd", "ilc", "model"),
         scenarios=names,
-        schedule=Schedule(startup=0.2, baseline=2.0, learning=2.0),
+        schedule=Schedule(startup=0.1, baseline=0.9, learning=1.3),
     )
     results = run_experiment(experiment, tmp_path / "result", workers=1, progress=False)
     write_report(results)
