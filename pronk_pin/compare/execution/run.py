@@ -131,7 +131,7 @@ def _complete(
         desc=f"simulating {robots} robots x {len(cells)}",
         unit=" robot-steps",
         unit_scale=True,
-        mininterval=0.5 if sys.stderr.isatty() else 10.0,
+        mininterval=0.5 if sys.stderr.isatty() else 60.0,
         disable=not progress or not cells,
     ) as bar:
         run = _Run(results, bar, set(cells))
