@@ -1,5 +1,6 @@
 # make compare   run the comparison of the paper, print the table, write report and replay
 # make test      run the tests
+# make mutants   put faults into the package one at a time, and see whether tests notice: hours
 # make docs      build the documentation as a site, in site/
 # make figures   make the figures in the documents again, by their commands; DOCUMENTS=docs/engines.md for one page
 # All create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
@@ -8,13 +9,16 @@ BIN := .venv/bin
 ARGS ?=
 DOCUMENTS ?= README.md $(wildcard docs/*.md)
 
-.PHONY: compare test lint docs figures clean
+.PHONY: compare test mutants lint docs figures clean
 
 compare: .venv/.installed
 	$(BIN)/pronk-pin compare $(ARGS)
 
 test: .venv/.installed-test
 	$(BIN)/python -m pytest -n auto --maxprocesses 4 --dist worksteal $(ARGS)
+
+mutants: .venv/.installed-test
+	$(BIN)/python benchmarks/mutants.py $(ARGS)
 
 lint: .venv/.installed-dev
 	$(BIN)/ruff check .

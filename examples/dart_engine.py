@@ -224,7 +224,6 @@ def build(robot, scenario, base):
     floor = body.createShapeNode(axes.BoxShape([1000.0, 1000.0, 1.0]))
     floor.setRelativeTranslation([0.0, 0.0, -0.5])
     touches(floor, scenario)
-    floor.getDynamicsAspect().setFirstFrictionDirection([1.0, 0.0, 0.0])
     world.addSkeleton(ground)
     world.addSkeleton(skeleton)
     return world, skeleton, feet
@@ -236,7 +235,11 @@ def set_inertia(dynamics, body, inertia):
 
 
 def touches(shape, scenario):
-    """Let a shape meet the ground, with the scenario's friction: a pyramid around the cone."""
+    """Let a shape meet the ground, with the scenario's friction.
+
+    Each direction's friction is bound by mu times the force that a ground without friction would
+    bear, as in ODE's Dantzig solver, of which this one is a child: a pyramid, not the cone.
+    """
     shape.createCollisionAspect()
     shape.createDynamicsAspect()
     shape.getDynamicsAspect().setFrictionCoeff(scenario.ground_friction)

@@ -17,7 +17,7 @@ EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
 SLOW = ("own_robot", "whole_body_qp", "dart_engine")
 
-LONGEST = {"dart_engine": 260}
+LONGEST = {"dart_engine": 270}
 """Lines of an example, 90 without a word of its own."""
 
 

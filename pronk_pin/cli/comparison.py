@@ -169,7 +169,7 @@ class Compare:
         times = ", ".join(f"{name} {time:.3g}" for name, time in results.control_times.items())
         if times:
             print(f"\ntime that controllers took on this machine, a robot and tick [us]: {times}")
-        _print_pages(results, _made(lambda: _report(results)))
+        _print_pages(results, lambda: _made(lambda: _report(results)))
 
 
 @dataclass(frozen=True)
@@ -227,7 +227,7 @@ class Report:
         print(format_summary(results.summary()))
         if engines := format_between_engines(results):
             print(f"\n{engines}")
-        _print_pages(results, str(_report(results)))
+        _print_pages(results, lambda: str(_report(results)))
         if self.figures is not None:
             for path in write_figures(results, self.figures):
                 print(f"figure   {path}")
@@ -316,8 +316,7 @@ class Explain:
         whole("draws", self.draws, DRAWS)
         none_or(real, "speed", self.speed)
         check_learner(self.controller)
-        if self.figure is not None:
-            known_figure(self.figure)
+        known_figure(self.figure)
 
 
 def command_line(experiment: Experiment) -> str:
@@ -357,15 +356,16 @@ def _report(results: Results) -> Path:
     return write_report(results, command=command_line(results.experiment))
 
 
-def _print_pages(results: Results, report: str) -> None:
-    """Where result, report and replay are; the replay is written here."""
+def _print_pages(results: Results, report: Callable[[], str]) -> None:
+    """Write the replay, and then the report, which links to it, and print where they are."""
     from ..viz import write_replay
     from ..viz.scenes import result_menu
 
     page = results.folder / "replay.html"
     print(f"\nresults  {results.folder}")
-    print(f"report   {report}")
-    print(f"replay   {_made(lambda: write_replay(result_menu(results), page))}")
+    replay = _made(lambda: write_replay(result_menu(results), page))
+    print(f"report   {report()}")
+    print(f"replay   {replay}")
 
 
 def _made(write: Callable[[], Path]) -> str:

@@ -46,8 +46,8 @@ class Analyze:
     """Robot."""
     gaits: str = "pronk"
     """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
-    figure: Path = Path("analysis.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -89,7 +89,8 @@ class Analyze:
             )
             predictions.append(compared)
             print(describe_prediction(predictions[-1]), end="\n\n")
-        print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
+        if self.figure is not None:
+            print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,12 @@ class Stability:
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         speeds = self.speed or _covered(self.robot, self.gaits, (0.6, 0.8))
         table = measure_stability(
-            spec, speeds, scenario, couplings=self.couplings, robot=self.robot
+            spec,
+            speeds,
+            scenario,
+            couplings=self.couplings,
+            robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_stability(table))
 
@@ -151,8 +157,8 @@ class Drive:
     """Robot."""
     gaits: str = "pronk"
     """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
-    figure: Path = Path("driving.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -175,7 +181,8 @@ class Drive:
             push=self.push,
         )
         print(format_commands(driving.summary))
-        print(f"\nfigure  {save_figure(driving_figure(driving.strides), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(driving_figure(driving.strides), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -219,8 +226,8 @@ class Gains:
     """Robot."""
     gaits: str = "pronk"
     """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
-    figure: Path = Path("gains.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -235,7 +242,8 @@ class Gains:
         speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
         table = sweep_gains(spec, speeds, scenario, robot=self.robot, gaits=self.gaits)
         print(describe_gains(table))
-        print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -259,8 +267,8 @@ class Transfer:
     """Robot."""
     gaits: str = "pronk"
     """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
-    figure: Path = Path("transfer.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -280,7 +288,8 @@ class Transfer:
             gaits=self.gaits,
         )
         print(describe_transfers(table))
-        print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -299,8 +308,8 @@ class Seeding:
     """Robot."""
     gaits: str = "pronk"
     """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
-    figure: Path = Path("seeding.png")
-    """Figure to write: png, svg or pdf."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -315,7 +324,8 @@ class Seeding:
             speeds, load_scenario(self.scenario), robot=self.robot, gaits=self.gaits
         )
         print(describe_seeding(table))
-        print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
+        if self.figure is not None:
+            print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
 
 
 @dataclass(frozen=True)

@@ -333,6 +333,10 @@ class Results(Displayed):
         self._keep(summary)
 
     def _keep(self, summary: pd.DataFrame) -> pd.DataFrame:
+        """Keep a summary, with its scenarios in the order of the experiment, as figures have it."""
+        place = {name: k for k, name in enumerate(self.experiment.scenario_names)}
+        order = summary["scenario"].map(place).argsort(kind="stable")
+        summary = summary.iloc[order].reset_index(drop=True)
         self._summaries.clear()
         self._summaries[self._digests] = summary
         return summary.copy()

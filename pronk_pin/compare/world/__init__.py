@@ -4,6 +4,7 @@ Comes in: a `Robot` or an MJCF, and a `Scenario`.
 Goes out: a `World` of an `Engine` that plays tapes or torques, and what sensors say of it.
 """
 
+from .drake_world import DrakeEngine
 from .engine import Engine, Motion, World
 from .engines import ENGINES, engine_of, load_engine
 from .imu import InertialUnit, level_specific_force
@@ -38,6 +39,7 @@ __all__ = [
     "MISMATCHES",
     "OTHER_ENGINES",
     "SCENARIOS",
+    "DrakeEngine",
     "Engine",
     "ForeignRobot",
     "InertialUnit",

@@ -11,7 +11,10 @@
 | robots | each is alone in its world, whoever is played beside it |
 | broken | a state that is not finite is told in `Motion.finite`, and raises nothing |
 
-Outside the engine, the same for all of them: delays, speed-torque curves and sensors. The suite
+Outside the engine, the same for all of them: delays, speed-torque curves and sensors. Inside it is
+the rest of a scenario: rotors, damping and dry friction, torque constants (which act on what limits
+have left of a torque), payload, slope, contact, and pushes (`push_force`, for which a state needs
+its time). The suite
 `tests/compare/world/test_engines.py` holds any engine to these promises.
 """
 
@@ -154,7 +157,8 @@ class Engine(Protocol):
 
         Raises:
             InvalidInput: It cannot; what it cannot do is named.
-            MissingExtra: It is not installed.
+            MissingExtra: It is not installed, and an extra of this package brings it; an engine of
+                your own raises `InvalidInput` and says what to install.
         """
 
     def world(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +13,6 @@ from pronk_pin.compare.simulation.schedule import Schedule
 from pronk_pin.errors import InvalidInput
 from pronk_pin.viz.report import scenario_figures
 from pronk_pin.viz.scenes.stride_scenes import result_menu
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
-    """Two speeds and two controllers, a few seconds each."""
-    experiment = Experiment(
-        speeds=(0.0, 0.5),
-        controllers=("pd", "ilc", "model"),
-        schedule=Schedule(baseline=5.0, learning=6.0),
-    )
-    folder: Path = tmp_path_factory.mktemp("results") / "short"
-    return run_experiment(experiment, folder, workers=1, progress=False)
 
 
 def test_the_first_scene_begins_three_strides_before_learning(results: Results) -> None:
@@ -132,12 +121,9 @@ def test_before_learning_needs_learning(results: Results) -> None:
         menu.scene({**menu.first, "beside it": "before learning"})
 
 
-def test_every_figure_has_its_axes_named_with_units(results: Results) -> None:
+def test_a_scenario_with_learning_and_a_model_has_six_figures(results: Results) -> None:
     found = scenario_figures(results, "nominal")
     assert set(found) == {"errors", "learning", "tracking", "torques", "surface", "difference"}
-    for name, figure in found.items():
-        labels = [a.get_ylabel() for a in figure.axes] + [a.get_xlabel() for a in figure.axes]
-        assert any("[" in label for label in labels), name
 
 
 def test_the_difference_is_the_learned_torque_less_the_models(results: Results) -> None:
@@ -152,3 +138,75 @@ def test_the_difference_is_the_learned_torque_less_the_models(results: Results) 
         torque[controller] = mine.sel(part="stance", joint="FL_calf").mean("stride").to_numpy()
     (curve,) = (line for line in figure.axes[0].lines if line.get_label() == "0.5")
     np.testing.assert_allclose(curve.get_ydata(), torque["ilc"] - torque["model"], atol=0.2)
+
+
+def test_the_reference_begins_each_stride_where_the_robot_touches_down(results: Results) -> None:
+    """And is the gait's from there, in place, time and posture; at 0.5 m/s strides are 0.2 m."""
+    scene = result_menu(results, speed=0.5, controller="pd").scene()
+    measured, planned = scene.tracks
+    (gait,) = results.experiment.planned_at([0.5])
+    touchdowns = [mark.t for mark in measured.marks if mark.phase == "stance"]
+    assert len(touchdowns) == 12
+    for begin in touchdowns:
+        there = measured.at(np.array([begin]))["q"][0]
+        np.testing.assert_allclose(planned.at(np.array([begin]))["q"][0, 0], there[0], atol=1e-9)
+        for s in (0.25, 0.75):
+            time = begin + s * gait.stance.duration
+            q = planned.at(np.array([time]))["q"][0]
+            base = gait.stance.base_reference(np.array([s]))[0][0]
+            np.testing.assert_allclose(q[[0, 2]] - [there[0], 0.0], base[:2], atol=2e-4)
+            joints = gait.stance.joint_reference(np.array([s]))[0][0]
+            np.testing.assert_allclose(q[7:], joints, atol=2e-3)
+
+
+def test_phases_are_named_as_the_feet_stand(results: Results) -> None:
+    for controller in ("pd", "ilc"):
+        scene = result_menu(results, speed=0.5, controller=controller).scene()
+        marks = scene.tracks[0].marks
+        assert [mark.phase for mark in marks[:4]] == ["stance", "flight", "stance", "flight"]
+        assert [mark.stride for mark in marks[:4]] == [marks[0].stride + k for k in (0, 0, 1, 1)]
+        for mark, following in pairwise(marks):
+            middle = np.array([0.5 * (mark.t + following.t)])
+            height = scene.rows(middle)[0]["feet"].reshape(4, 3)[:, 2] - scene.robot.foot_radius
+            if mark.phase == "stance":
+                assert np.abs(height).max() < 0.004
+            else:
+                assert height.min() > 0.01
+
+
+def test_marks_are_where_the_strides_begin(results: Results) -> None:
+    strides = results.strides(results.find(controller="pd")).sel(speed=0.5)
+    measured = result_menu(results, speed=0.5, controller="pd").scene().tracks[0]
+    starts, stances = strides["start"].to_numpy(), strides["stance"].to_numpy()
+    first = measured.marks[0].stride
+    for mark in measured.marks:
+        expected = starts[mark.stride] - starts[first]
+        expected += stances[mark.stride] if mark.phase == "flight" else 0.0
+        assert mark.t == pytest.approx(expected)
+
+
+def test_torques_are_those_that_the_motors_gave_and_never_more(results: Results) -> None:
+    menu = result_menu(results, speed=0.0, controller="pd")
+    scene = menu.scene()
+    mine = results.strides(results.find(controller="pd")).sel(speed=0.0)
+    stride = mine.isel(stride=scene.tracks[0].marks[4].stride).sel(phase=0.25)
+    for part in ("stance", "flight"):
+        at = stride.sel(part=part)
+        asked = (at["feedback"] + at["feedforward"]).to_numpy()
+        begin = next(mark.t for mark in scene.tracks[0].marks[4:] if mark.phase == part)
+        t = begin + 0.25 * float(mine["planned_duration"].sel(part=part))
+        limit = scene.robot.tau_max
+        drawn = scene.tracks[0].at(np.array([t]))["torque"][0]
+        np.testing.assert_allclose(drawn, np.clip(asked, -limit, limit), atol=1e-9)
+
+
+def test_the_robot_beside_is_asked_for_by_name_and_shown_in_its_own_colour(
+    results: Results,
+) -> None:
+    scene = result_menu(results, beside="model", speed=0.5, controller="pd").scene()
+    second = scene.tracks[2]
+    alone = result_menu(results, speed=0.5, controller="model").scene().tracks[0]
+    np.testing.assert_allclose(second.q[:, 2:], alone.q[:, 2:])
+    np.testing.assert_allclose(second.q[:, 1] - alone.q[:, 1], 0.55)
+    assert second.color != scene.tracks[0].color
+    assert [track.ghost for track in scene.tracks] == [False, True, False, True]

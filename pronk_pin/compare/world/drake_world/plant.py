@@ -44,6 +44,14 @@ _APPROXIMATIONS = {
 _STICKING = 1e-4
 """Joint speed below which dry friction holds, as a stiff damper [rad/s]."""
 
+_DISSIPATION = 20.0
+"""Of Hunt and Crossley's force, k x (1 + h v) at depth x and speed v inward, h [s/m].
+
+Feet land without a bounce, and let go where they are lifted faster than 1 / h. The lagged
+approximation needs that to be fast: beyond that speed it forgets the friction, too, and at
+1 cm/s (h = 100 s/m) feet slid in stances in which they should stand.
+"""
+
 
 @contextmanager
 def _without_warnings() -> Iterator[None]:
@@ -214,16 +222,15 @@ def _add_friction(plant: Any, robot: Robot, scenario: Scenario, model: pin.Model
 def _contact(robot: Robot, scenario: Scenario, approximation: str) -> Any:
     """Contact parameters of a foot or of the ground, which share the contact's softness.
 
-    Spring and damper of the robot's weight on its feet, m each, with the contact's time constant T
-    and critical damping: k = m / T^2, d = 2 m / T. SAP has that as stiffness k and relaxation time
-    2 T; Hunt and Crossley's force, k x (1 + h v), has that damping at rest, where x = g T^2.
+    Springs of the robot's weight on its feet, m each, with the contact's time constant T:
+    k = m / T^2. SAP has their critical damping, too, 2 m / T, as a relaxation time of 2 T; the
+    others are damped by `_DISSIPATION`.
     """
-    mass = robot.mass / len(robot.foot_names)
+    mass = (robot.bare or robot).mass / len(robot.foot_names)
     constant = scenario.ground_time_constant
-    damped = 2.0 / (scenario.gravity * constant)  # [s/m]
     properties, friction = ProximityProperties(), scenario.ground_friction
     AddContactMaterial(
-        dissipation=None if approximation == "sap" else damped,
+        dissipation=None if approximation == "sap" else _DISSIPATION,
         point_stiffness=2.0 * mass / constant**2,  # two such springs in series
         friction=CoulombFriction(friction, friction),
         properties=properties,
