@@ -694,7 +694,7 @@ VIEW_RESULT = {
     "speed": Case("--speed 0.0", first("speed [m/s]"), "0"),
     "controller": Case("--controller pd", first("controller"), "pd"),
     "scenario": Case("--scenario payload", first("scenario"), "payload"),
-    "beside": Case("--beside pd", first("beside it"), "pd"),
+    "beside": Case("--beside nothing", first("beside it"), "nothing"),
     "stride": Case("--stride 0", first("strides"), "from 0 on"),
 }
 FILMS = {
