@@ -196,7 +196,8 @@ def test_the_heat_map_writes_each_mean_in_its_own_cell(results: Results) -> None
         means = rows.groupby("controller")["value"].mean()
         (image,) = axes.images
         expected = [means[name] for name in ("pd", "model", "ilc")]
-        np.testing.assert_allclose(np.asarray(image.get_array())[0], expected)
+        milliradians = np.asarray(image.get_array())[0]
+        np.testing.assert_allclose(milliradians, 1e3 * np.array(expected))
         written = {text.get_position(): text.get_text() for text in axes.texts}
         assert written == {(k, 0): f"{1e3 * mean:.0f}" for k, mean in enumerate(expected)}
 

@@ -182,7 +182,7 @@ def test_the_heat_map_has_a_row_a_scenario_and_says_who_fell() -> None:
         for row, table in enumerate(TABLES.values()):
             for column, name in enumerate(names):
                 expected = table[name].joints[joint].peak.value if name in table else np.nan
-                np.testing.assert_equal(values[row, column], expected)
+                np.testing.assert_equal(values[row, column], 1e3 * expected)  # mrad
         written = {text.get_position(): text.get_text() for text in axes.texts}
         mine = TABLES["nominal"]["ilc"].joints[joint].peak.value
         assert written[names.index("ilc"), 0] == f"{1e3 * mine:.0f}\n1 fell"
