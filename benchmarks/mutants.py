@@ -240,12 +240,12 @@ def stages(fault: Fault, *, own: bool) -> Iterator[list[str]]:
     tests, run = ROOT / "tests", set[str]()
     folder = tests / fault.room
     groups = [[folder / f"test_{fault.path.stem}.py"], folder.glob("test_*.py")]
-    if not own:
-        groups += [
-            place.rglob("test_*.py")
-            for place in (folder, *folder.parents)
-            if place.is_relative_to(tests)
-        ]
+    outside = [place for place in (folder, *folder.parents) if place.is_relative_to(tests)]
+    if own:  # a room without a folder of tests is tested in that of the room around it
+        outside = next(([place] for place in outside if any(place.glob("test_*.py"))), [])
+        groups += [place.glob("test_*.py") for place in outside]
+    else:
+        groups += [place.rglob("test_*.py") for place in outside]
     for group in groups:
         files = sorted(str(file.relative_to(ROOT)) for file in group if file.exists())
         new = [file for file in files if file.startswith("tests/") and file not in run]

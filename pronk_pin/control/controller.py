@@ -244,6 +244,7 @@ class Controller:
             )
         return CommandFollower(
             command,
+            self.robot,
             self.spec,
             gaits=self.gaits,
             stance=self._stance,
@@ -283,7 +284,13 @@ class Controller:
         began = self._flight.position[rows, 0]  # where the stances end
         following = self._following if commanded is not None else None
         if following is not None and commanded is not None:
-            self._lift_off_speed[rows] = following.lift_off(rows, commanded, speed)
+            self._lift_off_speed[rows] = following.lift_off(
+                rows,
+                commanded,
+                speed,
+                rising=self._estimator.upward[rows],
+                joints=log.joints[np.arange(len(rows)), log.length - 1],
+            )
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         reference = self._flight
         ticks = slice(int(_LATE_TOUCHDOWN * reference.ends(rows).max()))

@@ -160,6 +160,11 @@ class SpeedCommand:
         return self.gaits_at(self.speed)
 
     @property
+    def speeds(self) -> Array:
+        """Speeds of the library [m/s]."""
+        return self._library.speeds
+
+    @property
     def all_gaits(self) -> tuple[Gait, ...]:
         """The library's gaits, than which none that is played is longer."""
         return self._library.gaits

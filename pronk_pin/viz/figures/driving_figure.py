@@ -48,7 +48,9 @@ def driving_figure(table: pd.DataFrame) -> Figure:
         _gait(speed, rows)
         for axes in column:
             for begin, end in transitions(profile):
-                axes.axvspan(begin, max(end, begin + 0.02), color="0.92", lw=0, zorder=0)
+                axes.axvspan(
+                    begin, max(end, begin + 0.01 * profile.duration), color="0.92", lw=0, zorder=0
+                )
         speed.set_title("\n".join(_lines(shortened(command, 100))), fontsize=7)
         share.set_xlabel("time [s]")
         error.set_ylim(bottom=0.0)

@@ -79,7 +79,8 @@ def test_reference_less_error_is_where_the_joints_are(results: Results) -> None:
             joints = (own["reference"] - own["error"]).transpose("phase", "joint").to_numpy()
             ticks = own["tick_joints"].isel(last=k - (count - last)).transpose("tick", "joint")
             ticks = ticks.to_numpy()[np.isfinite(ticks.to_numpy()).all(axis=1)]
-            index = own["phase"].to_numpy() * float(own["planned_duration"]) / timestep
+            lasts = own["planned_duration"] if part == 0 else own["flight_reference"]
+            index = own["phase"].to_numpy() * float(lasts) / timestep
             there = (index > 2.0) & (index < len(ticks) - 1)  # from when contact is felt
             for j in range(joints.shape[1]):
                 seen = np.interp(index[there], np.arange(len(ticks)), ticks[:, j])

@@ -195,11 +195,10 @@ def test_the_heat_map_writes_each_mean_in_its_own_cell(results: Results) -> None
         rows = summary[(summary["joint"] == joint) & (summary["metric"] == "peak_error")]
         means = rows.groupby("controller")["value"].mean()
         (image,) = axes.images
-        expected = [means[name] for name in ("pd", "model", "ilc")]
-        milliradians = np.asarray(image.get_array())[0]
-        np.testing.assert_allclose(milliradians, 1e3 * np.array(expected))
+        expected = [1e3 * means[name] for name in ("pd", "model", "ilc")]  # mrad
+        np.testing.assert_allclose(np.asarray(image.get_array())[0], expected)
         written = {text.get_position(): text.get_text() for text in axes.texts}
-        assert written == {(k, 0): f"{1e3 * mean:.0f}" for k, mean in enumerate(expected)}
+        assert written == {(k, 0): f"{mean:.0f}" for k, mean in enumerate(expected)}
 
 
 def test_curves_of_all_scenarios_begin_with_the_first_stride_of_learning() -> None:
@@ -271,3 +270,18 @@ def test_a_summary_of_several_seeds_is_drawn_as_their_mean() -> None:
     table.loc[table["metric"] == "upright", "joint"] = "-"
     axes = panel(errors_by_speed(table, scenario="nominal"), "calf")
     np.testing.assert_allclose(curve(axes, "PD"), [[0.1, 0.11], [0.3, 0.31]])
+
+
+def test_errors_that_differ_by_powers_of_ten_are_on_an_axis_that_shows_them_all(
+    results: Results, strides: dict[str, xr.Dataset]
+) -> None:
+    for figure in (
+        errors_by_speed(results.summary(), scenario="nominal"),
+        learning_curves(strides),
+    ):
+        for axes in figure.axes:
+            drawn = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
+            low, high = axes.get_ylim()
+            assert axes.get_yscale() == "log"
+            assert low <= np.nanmin(np.concatenate(drawn))
+            assert high >= np.nanmax(np.concatenate(drawn))

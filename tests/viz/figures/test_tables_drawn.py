@@ -37,35 +37,39 @@ def curve(axes: Axes, label: str) -> Array:
     return np.column_stack([np.asarray(each, dtype=float) for each in line.get_data()])
 
 
-def test_a_drive_shows_speeds_and_errors_of_each_command_over_time() -> None:
+def test_a_drive_shows_speeds_errors_and_feedback_of_each_command_over_time() -> None:
+    commands = {"0 1s, 0->0.4 1s": [0.0, 0.0, 0.0, 0.08, 0.24], "0.3 2s": [0.3] * 5}
     rows = [
         {
             "command": command,
             "controller": controller,
             "time": 0.4 * k,
-            "commanded": 0.1 * k + shift,
-            "speed": 0.1 * k + shift - 0.01 * place,
+            "commanded": speeds[k],
+            "gait_speed": speeds[k],
+            "speed": speeds[k] - 0.01 * place,
             "calf": 0.001 * (k + 1) * (place + 1),
+            "feedback_share": 0.1 * (k + 1) / (place + 1),
         }
-        for command, shift in (("slow", 0.0), ("fast", 0.3))
+        for command, speeds in commands.items()
         for place, controller in enumerate(("pd", "library"))
         for k in range(5)
     ]
     table = pd.DataFrame(rows)
     axes = driving_figure(table).axes
-    assert [panel.get_title() for panel in axes[:2]] == ["slow", "fast"]
-    for column, command in enumerate(("slow", "fast")):
-        above, below = axes[column], axes[2 + column]
+    assert [panel.get_title() for panel in axes[:2]] == list(commands)
+    for column, command in enumerate(commands):
+        speed, error, share = axes[column::2]
         mine = table[table["command"] == command]
         for controller in ("pd", "library"):
             of = mine[mine["controller"] == controller]
             label = look(controller).label
-            np.testing.assert_allclose(curve(above, label), of[["time", "speed"]])
-            np.testing.assert_allclose(curve(below, label)[:, 1], 1e3 * of["calf"])  # [mrad]
-        np.testing.assert_allclose(curve(above, "commanded"), of[["time", "commanded"]])
-    assert axes[0].get_ylabel() == "speed [m/s]"
-    assert axes[2].get_ylabel() == "peak calf error [mrad]"
-    assert axes[3].get_xlabel() == "time [s]"
+            np.testing.assert_allclose(curve(speed, label), of[["time", "speed"]])
+            np.testing.assert_allclose(curve(error, label)[:, 1], 1e3 * of["calf"])  # [mrad]
+            np.testing.assert_allclose(curve(share, label)[:, 1], 100.0 * of["feedback_share"])
+    np.testing.assert_allclose(curve(axes[0], "commanded"), [[0, 0], [1, 0], [2, 0.4]])
+    labels = [panel.get_ylabel() for panel in axes[::2]]
+    assert labels == ["speed [m/s]", "peak calf error [mrad]", "feedback's share [%]"]
+    assert axes[5].get_xlabel() == "time [s]"
 
 
 def test_learning_by_what_it_began_with_is_a_median_and_a_range_of_those_that_stood() -> None:
@@ -182,7 +186,7 @@ def test_the_heat_map_has_a_row_a_scenario_and_says_who_fell() -> None:
         for row, table in enumerate(TABLES.values()):
             for column, name in enumerate(names):
                 expected = table[name].joints[joint].peak.value if name in table else np.nan
-                np.testing.assert_equal(values[row, column], 1e3 * expected)  # mrad
+                np.testing.assert_allclose(values[row, column], 1e3 * expected)  # mrad
         written = {text.get_position(): text.get_text() for text in axes.texts}
         mine = TABLES["nominal"]["ilc"].joints[joint].peak.value
         assert written[names.index("ilc"), 0] == f"{1e3 * mine:.0f}\n1 fell"

@@ -402,3 +402,8 @@ def test_phases_of_a_gait_scene_are_named_as_its_feet_are_loaded(robot: Robot) -
         motion = phase.motion(robot, s)
         np.testing.assert_allclose(track.torque[inside], motion.tau, atol=1e-9)
         np.testing.assert_allclose(track.forces[inside], motion.lam, atol=1e-9)
+
+
+def test_the_view_follows_a_steady_run_to_its_very_end(scene: Scene, hop: Track) -> None:
+    ends = hop.t[[0, -1]]
+    np.testing.assert_allclose(scene.view(ends)[:, 0], 0.5 * ends, atol=1e-6)
