@@ -73,7 +73,7 @@ def build_library(
         robot: The robot.
         speeds: Speeds [m/s], in any order; by default those of the gait's style.
         apexes: Greatest heights of the trunk [m], in any order; by default the style's.
-        gait: Name of the style: "pronk" or "bound".
+        gait: Name of the style: "pronk", "bound" or "trot".
         base: How the trunk may move; None for the style's own.
         path: Where to save the library; None does not save it.
         folder: Where each gait is kept as soon as it is solved, and taken from if it is there;
