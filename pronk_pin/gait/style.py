@@ -36,6 +36,7 @@ class Style:
         apex: Greatest height of the A1's trunk in its library [m]; of others see `apex_of`.
         stride: Shortest and longest stride [s].
         trunk: What is asked of a free trunk; None for the others.
+        start: The speed that a library begins with [m/s]: one that a crude guess leads to.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Style:
     apex: float
     stride: tuple[float, float]
     trunk: FreeTrunk | None = None
+    start: float = 0.0
 
     def apex_of(self, robot: Robot) -> float:
         """Greatest height of a robot's trunk in its library [m], scaled from the A1's."""
@@ -71,10 +73,11 @@ STYLES: Mapping[str, Style] = {
             TROT,
             "free",
             TROT,
-            _speeds(-0.4, 1.2)[::2],
+            _speeds(-0.4, 0.8)[::2],
             0.31,
             (0.36, 0.6),
             FreeTrunk(half_stride=True),
+            0.4,
         ),
     )
 }

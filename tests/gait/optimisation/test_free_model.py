@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin.errors import UnknownName
-from pronk_pin.gait import gait_problem
+from pronk_pin.gait import gait_problem, load_library
 from pronk_pin.gait.optimisation.folded_model import fold
 from pronk_pin.kinematics import (
     contact_jacobian,
@@ -72,3 +72,13 @@ def test_the_other_half_of_a_trot_is_on_the_other_diagonal(robot: Robot) -> None
 def test_pronking_on_a_free_trunk_is_refused(robot: Robot) -> None:
     with pytest.raises(UnknownName, match="choose one of: locked, sagittal"):
         gait_problem(robot, 0.5, base="free")
+
+
+def test_shipped_trot_keeps_its_standing_feet_on_the_ground(robot: Robot) -> None:
+    for gait in load_library("a1", gait="trot").gaits:
+        for phase in gait.phases:
+            q = phase.motion(robot, np.linspace(0.0, 1.0, 101)).q
+            height = foot_positions(robot, q)[..., 2] - robot.foot_radius
+            standing = [robot.legs.index(foot) for foot in phase.feet]
+            np.testing.assert_allclose(height[:, standing], 0.0, atol=1e-5)
+            assert np.min(height) > -1e-5
