@@ -2,13 +2,16 @@
 
 The stream of `display` with two robots and contact forces, as a page receives it, beside the plain
 `MeshcatVisualizer.display` loop with one robot; the size of a file with such a scene of 5 s, and
-how long a browser takes from opening it to the first frame drawn, in software rendering.
+how long a browser takes from opening it to the first frame drawn, in software rendering. With a
+results folder, `python benchmarks/viz.py results/<folder>`: the same of its replay, and how many of
+the choices it holds.
 """
 
 from __future__ import annotations
 
 import asyncio
 import statistics
+import sys
 import tempfile
 import threading
 import time
@@ -21,11 +24,13 @@ from pinocchio.visualize import MeshcatVisualizer
 from tornado.websocket import websocket_connect
 
 from pronk_pin import load_robot
+from pronk_pin.compare import Results
 from pronk_pin.errors import NoBrowser
 from pronk_pin.gait import load_library
 from pronk_pin.robot import Robot
 from pronk_pin.viz import LiveServer, Scene, gait_scene, write_replay
 from pronk_pin.viz.player import Browser
+from pronk_pin.viz.scenes import result_menu
 
 SECONDS = 3.0
 
@@ -106,8 +111,28 @@ def ready_times(path: Path, count: int = 3) -> list[float]:
     return found
 
 
+def result_replay(folder: Path) -> None:
+    """Size, choices and first frame of the replay of a result."""
+    menu = result_menu(Results.load(folder))
+    with tempfile.TemporaryDirectory() as place:
+        begin = time.monotonic()
+        path = write_replay(menu, Path(place) / "replay.html")
+        made = time.monotonic() - begin
+        with Browser(1280, 800) as browser:
+            browser.open(path.as_uri())
+            held = browser.run("player.source.held.length")
+        ready = max(ready_times(path))
+        print(f"replay                                        {path.stat().st_size / 1e6:8.2f} MB")
+        print(f"choices in it                                 {held:8d}")
+        print(f"written in                                    {made:8.1f} s")
+        print(f"opened to first frame, longest of three       {ready:8.2f} s")
+
+
 def main() -> None:
     """Measure, and print."""
+    if len(sys.argv) > 1:
+        result_replay(Path(sys.argv[1]))
+        return
     robot = load_robot("a1")
     scene = two_robots(robot)
     with tempfile.TemporaryDirectory() as folder:

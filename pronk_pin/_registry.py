@@ -1,9 +1,9 @@
 """Objects by name: those that are shipped, those that installed packages announce as entry points,
 and any at an address, `module:object`.
 
-An entry point of the group `pronk_pin.controllers` (likewise `.robots`, `.scenarios`, `.metrics`)
-is found by its name. An address is imported as Python imports: from what is installed, or from the
-folder that the program was started in.
+An entry point of the group `pronk_pin.controllers` (likewise `.robots`, `.scenarios`, `.engines`,
+`.metrics`) is found by its name. An address is imported as Python imports: from what is installed,
+or from the folder that the program was started in.
 """
 
 from __future__ import annotations
@@ -93,9 +93,11 @@ def function_address(name: str, value: object) -> str:
 
 
 def source_sha256(thing: object) -> str:
-    """SHA-256 of the module that a class or function comes from; "unknown" without a file."""
+    """SHA-256 of the module that a class, a function, or an object's class comes from; "unknown"
+    without a file."""
+    source = thing if inspect.isclass(thing) or inspect.isroutine(thing) else type(thing)
     try:
-        return digest(Path(inspect.getfile(thing)).read_bytes())  # type: ignore[arg-type]
+        return digest(Path(inspect.getfile(source)).read_bytes())
     except (OSError, TypeError):
         return "unknown"  # typed in by hand, or compiled
 

@@ -225,6 +225,19 @@ class ExecutorUnavailable(PronkError):
         super().__init__(f"{address}: {problem}; {remedy}")
 
 
+class MissingExtra(PronkError):
+    """Something that is asked for needs a package that is not installed.
+
+    Attributes:
+        package: The package.
+        extra: The extra of this package that brings it.
+    """
+
+    def __init__(self, package: str, extra: str) -> None:
+        self.package, self.extra = package, extra
+        super().__init__(f"{package} is not installed; pip install 'pronk-pin[{extra}]'")
+
+
 class PortUnavailable(PronkError):
     """A port that the live page cannot have.
 

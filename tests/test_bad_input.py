@@ -20,13 +20,13 @@ from pronk_pin import kinematics as kin
 from pronk_pin.cli import main
 from pronk_pin.compare import (
     Experiment,
+    MujocoWorld,
     Results,
     Scenario,
     Schedule,
     Sensors,
     SensorSuite,
     Simulation,
-    World,
     explain,
     load_scenario,
     random_scenarios,
@@ -432,11 +432,11 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "rng=0 is an int; give a numpy.ran",
     ),
     "no robots": (
-        lambda: World(a1(), load_scenario("ideal"), 0),
+        lambda: MujocoWorld(a1(), load_scenario("ideal"), 0),
         "n=0; give a whole number from 1",
     ),
     "world of a name": (
-        lambda: World(a1(), "ideal", 1),
+        lambda: MujocoWorld(a1(), "ideal", 1),
         "scenario='ideal' is a str; give a Scenario, as load_scenario() returns it",
     ),
     # Schedules, simulations, experiments

@@ -27,7 +27,7 @@ from pronk_pin import Robot, RobotSpec, load_robot
 from pronk_pin.cli import main
 from pronk_pin.compare import Experiment, Results, Schedule, load_scenario, run_experiment
 from pronk_pin.compare.experiment.description import describe
-from pronk_pin.compare.world.mjcf import ForeignRobot, mjcf_sha256, mjcf_spec
+from pronk_pin.compare.world.mujoco_world.mjcf import ForeignRobot, mjcf_sha256, mjcf_spec
 from pronk_pin.compare.world.scenario import Scenario
 from pronk_pin.control import TorqueLibrary
 from pronk_pin.errors import FileProblem, PronkError

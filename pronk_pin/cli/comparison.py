@@ -57,10 +57,21 @@ class ExperimentOptions(TypedDict, total=False):
     mjcf: str
     """MJCF of the robot, with the same joint names, that stands in for its URDF in the simulation;
     by default the URDF is simulated. Scenarios add to what is in it: ideal takes it as it is."""
+    engine: Annotated[str, arg(metavar="NAME|MODULE:OBJECT")]
+    """Engine that simulates the scenarios that name none: a name of `pronk-pin list engines`, or an
+    address; by default mujoco. Scenarios may name it themselves, as nominal+drake."""
     schedule: ScheduleOptions
     """What happens when."""
     metrics: Annotated[tuple[str, ...], arg(metavar="[MODULE:OBJECT [...]]")]
     """Metrics of your own, beside those of `pronk-pin list metrics`; by default none."""
+    commands: Annotated[tuple[str, ...], arg(name="command", metavar="[PROFILE|FILE [...]]")]
+    """Speeds that change, instead of constant ones, each in quotes: "0 4s, 0->0.8 2s, 0.8 4s", a
+    speed [m/s] and how long, or two with an arrow; "0.3+-0.2/5s 20s", a sine; or a csv file of time
+    and speed. What was learned, or computed, at the speeds is used in between; speeds are by
+    default those of the gait library that the commands span. By default none."""
+    reference: str
+    """With commands, speed by which gaits are chosen: commanded, or measured, that of the torso; by
+    default commanded."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +109,8 @@ class Compare:
         given: dict[str, Any] = {**self.options}
         # Speeds and controllers begin with those of the robot and its gaits.
         first = {name: given[name] for name in ("robot", "gaits", "base") if name in given}
+        if given.get("commands"):
+            given.setdefault("speeds", ())  # those that the commands span
         begun = load_suite(self.suite or "default", **first)
         if self.config is not None:
             begun = read_config(self.config)
@@ -128,13 +141,15 @@ class Compare:
                 mjcf=experiment.mjcf,
                 schedule=schedule,
                 metrics=tuple(map(name_of, experiment.metrics)),
+                commands=experiment.commands,
+                reference=experiment.reference,
             ),
         )
 
     def run(self) -> None:
         """Do it."""
         from ..compare import default_folder, mjcf_parity, run_experiment
-        from ..compare.report import format_summary
+        from ..compare.report import format_between_engines, format_summary
 
         name = "comparison" if self.suite in (None, "default") else self.suite
         folder, world = self.folder or default_folder(name), self.experiment.mjcf
@@ -149,10 +164,12 @@ class Compare:
         )
         print(f"robot {results.experiment.robot_name}, base {results.experiment.base}\n")
         print(format_summary(results.summary()))
+        if engines := format_between_engines(results):
+            print(f"\n{engines}")
         times = ", ".join(f"{name} {time:.3g}" for name, time in results.control_times.items())
         if times:
             print(f"\ntime that controllers took on this machine, a robot and tick [us]: {times}")
-        _print_pages(results, _made(lambda: _report(results)))
+        _print_pages(results, lambda: _made(lambda: _report(results)))
 
 
 @dataclass(frozen=True)
@@ -200,7 +217,7 @@ class Report:
     def run(self) -> None:
         """Do it."""
         from ..compare import Results
-        from ..compare.report import format_changes, format_summary
+        from ..compare.report import format_between_engines, format_changes, format_summary
         from ..viz.report import write_figures
 
         results = Results.load(self.result)
@@ -208,7 +225,9 @@ class Report:
             print(format_changes(results, Results.load(self.other)))
             return
         print(format_summary(results.summary()))
-        _print_pages(results, str(_report(results)))
+        if engines := format_between_engines(results):
+            print(f"\n{engines}")
+        _print_pages(results, lambda: str(_report(results)))
         if self.figures is not None:
             for path in write_figures(results, self.figures):
                 print(f"figure   {path}")
@@ -260,6 +279,7 @@ class Explain:
 
         self._check()
         results = Results.load(self.result)
+        results.check_constant("explain")
         if self.speed is not None:
             nearest(results.experiment.speeds, self.speed, "speed")
         cell = results.find(controller=self.controller, scenario=self.scenario)
@@ -296,8 +316,7 @@ class Explain:
         whole("draws", self.draws, DRAWS)
         none_or(real, "speed", self.speed)
         check_learner(self.controller)
-        if self.figure is not None:
-            known_figure(self.figure)
+        known_figure(self.figure)
 
 
 def command_line(experiment: Experiment) -> str:
@@ -311,6 +330,7 @@ def command_line(experiment: Experiment) -> str:
     own = (experiment.robot, experiment.gaits, *experiment.controllers, *experiment.scenarios)
     if experiment.metrics or not all(isinstance(value, str) for value in own):
         return "pronk-pin compare --config config.json"
+    driven = bool(experiment.commands)
     words += [f"--robot {experiment.robot_name}"]
     words += [f"--gaits {experiment.gaits}"] if experiment.gaits != "pronk" else []
     words += [f"--apex {experiment.apex:g}"] if experiment.apex is not None else []
@@ -320,6 +340,8 @@ def command_line(experiment: Experiment) -> str:
     words += ["--seeds " + " ".join(map(str, experiment.seeds))]
     words += [f"--base {experiment.base}"]
     words += [f"--mjcf {shlex.quote(experiment.mjcf)}"] if experiment.mjcf else []
+    words += ["--command " + " ".join(map(shlex.quote, experiment.commands))] * driven
+    words += [f"--reference {experiment.reference}"] * driven
     schedule = experiment.schedule
     words += [
         f"--schedule.{name} {getattr(schedule, name):g}"
@@ -334,15 +356,16 @@ def _report(results: Results) -> Path:
     return write_report(results, command=command_line(results.experiment))
 
 
-def _print_pages(results: Results, report: str) -> None:
-    """Where result, report and replay are; the replay is written here."""
+def _print_pages(results: Results, report: Callable[[], str]) -> None:
+    """Write the replay, and then the report, which links to it, and print where they are."""
     from ..viz import write_replay
     from ..viz.scenes import result_menu
 
     page = results.folder / "replay.html"
     print(f"\nresults  {results.folder}")
-    print(f"report   {report}")
-    print(f"replay   {_made(lambda: write_replay(result_menu(results), page))}")
+    replay = _made(lambda: write_replay(result_menu(results), page))
+    print(f"report   {report()}")
+    print(f"replay   {replay}")
 
 
 def _made(write: Callable[[], Path]) -> str:

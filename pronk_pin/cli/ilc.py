@@ -15,12 +15,11 @@ _FINE = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
 """Speeds [m/s] of studies that need neighbours."""
 
 
-def _covered(robot: str, speeds: tuple[float, ...]) -> tuple[float, ...]:
-    """Those of some speeds [m/s] that the gaits shipped for a robot cover."""
-    from ..gait import load_library
-    from ..robot import load_robot
+def _covered(robot: str, gaits: str, speeds: tuple[float, ...]) -> tuple[float, ...]:
+    """Those of some speeds [m/s] that the gaits of a robot cover."""
+    from ..compare.studies import machine_and_gaits
 
-    covered = load_library(load_robot(robot).name).speeds
+    covered = machine_and_gaits(robot, gaits)[1].speeds
     return tuple(speed for speed in speeds if covered[0] <= speed <= covered[-1])
 
 
@@ -45,8 +44,10 @@ class Analyze:
     """Strides of learning to compare."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("analysis.png")
-    """Figure to write: png, svg or pdf."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -56,6 +57,7 @@ class Analyze:
             STRIDES,
             compare_prediction,
             describe_prediction,
+            machine_and_gaits,
             simulate_learning,
             stored_learning,
         )
@@ -65,12 +67,14 @@ class Analyze:
 
         whole("strides", self.strides, STRIDES)
         known_figure(self.figure)
-        gaits: list[Gait] | None = None  # those that are shipped
+        gaits: list[Gait]
         if self.result is None:
             spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
             strides = simulate_learning(
-                spec, self.speed, scenario, robot=self.robot, strides=self.strides
+                spec, self.speed, scenario, robot=self.robot, gaits=self.gaits, strides=self.strides
             )
+            _, library = machine_and_gaits(self.robot, self.gaits)
+            gaits = [library.at(speed) for speed in self.speed]
         else:
             results = Results.load(self.result)
             experiment = results.experiment
@@ -80,12 +84,13 @@ class Analyze:
             gaits = experiment.planned_at(self.speed)
         predictions = []
         for k, speed in enumerate(self.speed):
-            gait = None if gaits is None else gaits[k]
-            predictions.append(
-                compare_prediction(spec, strides, speed, scenario, number=self.strides, gait=gait)
+            compared = compare_prediction(
+                spec, strides, speed, scenario, number=self.strides, gait=gaits[k]
             )
+            predictions.append(compared)
             print(describe_prediction(predictions[-1]), end="\n\n")
-        print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
+        if self.figure is not None:
+            print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -106,6 +111,8 @@ class Stability:
     """Shares of the stance's errors that the flight's law is shown."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
 
     def run(self) -> None:
         """Do it."""
@@ -114,9 +121,14 @@ class Stability:
         from ..control import load_controller
 
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
-        speeds = self.speed or _covered(self.robot, (0.6, 0.8))
+        speeds = self.speed or _covered(self.robot, self.gaits, (0.6, 0.8))
         table = measure_stability(
-            spec, speeds, scenario, couplings=self.couplings, robot=self.robot
+            spec,
+            speeds,
+            scenario,
+            couplings=self.couplings,
+            robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_stability(table))
 
@@ -131,35 +143,46 @@ class Drive:
     command: tuple[str, ...] = ()
     """Speed profiles, each in quotes: "0 4s, 0->0.8 2s, 0.8 4s", a speed [m/s] and how long, or two
     with an arrow. Where a piece begins at another speed than the last ended, the command steps. By
-    default ramps and steps up and down."""
+    default ramps and steps up and down. A csv file of time and speed is one, too."""
     controllers: tuple[str, ...] = ("pd", "model", "library", "library+ilc")
     """Controllers."""
     scenario: str = "nominal"
     """Scenario, of the learning and of the driving."""
-    reference: str = "commanded"
-    """Speed by which gaits are chosen: commanded, or measured, that of the torso."""
+    reference: tuple[str, ...] = ("commanded",)
+    """Speeds by which gaits are chosen: commanded, or measured, that of the torso; or both."""
+    push: float = 0.0
+    """Impulse of a push forward, once, after three fifths of the longest command [N s]; with one
+    the default commands are constant speeds."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("driving.png")
-    """Figure to write: png, svg or pdf."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
+        from .._checks import Interval, real
         from ..compare import load_scenario
-        from ..compare.studies import RAMPS, describe_driving, measure_driving
+        from ..compare.report import format_commands
+        from ..compare.studies import PUSHED, RAMPS, measure_driving
         from ..viz import known_figure, save_figure
         from ..viz.figures import driving_figure
 
         known_figure(self.figure)
-        table = measure_driving(
-            self.command or RAMPS,
+        real("push", self.push, Interval(-200, 200, "N s"))
+        driving = measure_driving(
+            self.command or (PUSHED if self.push else RAMPS),
             load_scenario(self.scenario),
             controllers=self.controllers,
             robot=self.robot,
-            reference=self.reference,
+            gaits=self.gaits,
+            references=self.reference,
+            push=self.push,
         )
-        print(describe_driving(table))
-        print(f"\nfigure  {save_figure(driving_figure(table), self.figure)}")
+        print(format_commands(driving.summary))
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(driving_figure(driving.strides), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -173,6 +196,8 @@ class Wander:
     """Scenario."""
     robot: str = "a1"
     """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
 
     def run(self) -> None:
         """Do it."""
@@ -180,7 +205,7 @@ class Wander:
         from ..compare.studies import SWEEPS, describe_wandering, measure_wandering
 
         command, scenario = self.command or SWEEPS, load_scenario(self.scenario)
-        table = measure_wandering(command, scenario, robot=self.robot)
+        table = measure_wandering(command, scenario, robot=self.robot, gaits=self.gaits)
         print(describe_wandering(table))
 
 
@@ -199,8 +224,10 @@ class Gains:
     """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("gains.png")
-    """Figure to write: png, svg or pdf."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -212,10 +239,11 @@ class Gains:
 
         known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
-        speeds = self.speed or _covered(self.robot, (-0.4, 0.0, 0.4, 0.8))
-        table = sweep_gains(spec, speeds, scenario, robot=self.robot)
+        speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
+        table = sweep_gains(spec, speeds, scenario, robot=self.robot, gaits=self.gaits)
         print(describe_gains(table))
-        print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -237,8 +265,10 @@ class Transfer:
     """Scenarios in which the stored feedforward is tried."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("transfer.png")
-    """Figure to write: png, svg or pdf."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -251,13 +281,15 @@ class Transfer:
         known_figure(self.figure)
         table = measure_transfers(
             load_controller(self.controller),
-            self.speed or _covered(self.robot, _FINE),
+            self.speed or _covered(self.robot, self.gaits, _FINE),
             load_scenario(self.scenario),
             [load_scenario(name) for name in self.scenarios],
             robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_transfers(table))
-        print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
+        if self.figure is not None:
+            print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
 
 
 @dataclass(frozen=True)
@@ -274,8 +306,10 @@ class Seeding:
     """Scenario of the learning."""
     robot: str = "a1"
     """Robot."""
-    figure: Path = Path("seeding.png")
-    """Figure to write: png, svg or pdf."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+    figure: Path | None = None
+    """Draw the result into this file: png, svg or pdf; by default it is not drawn."""
 
     def run(self) -> None:
         """Do it."""
@@ -285,10 +319,48 @@ class Seeding:
         from ..viz.figures import errors_by_seed
 
         known_figure(self.figure)
-        speeds = self.speed or _covered(self.robot, _FINE)
-        table = measure_seeding(speeds, load_scenario(self.scenario), robot=self.robot)
+        speeds = self.speed or _covered(self.robot, self.gaits, _FINE)
+        table = measure_seeding(
+            speeds, load_scenario(self.scenario), robot=self.robot, gaits=self.gaits
+        )
         print(describe_seeding(table))
-        print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
+        if self.figure is not None:
+            print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
+
+
+@dataclass(frozen=True)
+class Engines:
+    """Tell whether what was learned in one engine holds in another, and how far to learn on.
+
+    Each engine's torque library is replayed in the others, beside nothing and the model, and then
+    learned on from.
+    """
+
+    engines: Positional[tuple[str, ...]] = ("mujoco", "drake")
+    """Engines: names of `pronk-pin list engines`, or addresses."""
+    speed: tuple[float, ...] = ()
+    """Speeds [m/s]; by default -0.4 to 0.8 in steps of 0.4, as far as the robot's gaits go."""
+    scenario: str = "nominal"
+    """Scenario."""
+    robot: str = "a1"
+    """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+
+    def run(self) -> None:
+        """Do it."""
+        from ..compare import load_scenario
+        from ..compare.studies import (
+            describe_engine_transfer,
+            machine_and_gaits,
+            measure_engine_transfer,
+        )
+
+        speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
+        robot, library = machine_and_gaits(self.robot, self.gaits)
+        gaits = [library.at(speed) for speed in speeds]
+        table = measure_engine_transfer(robot, gaits, load_scenario(self.scenario), self.engines)
+        print(describe_engine_transfer(table))
 
 
 @dataclass(frozen=True)
@@ -303,6 +375,7 @@ class Ilc:
         | Annotated[Wander, subcommand("wander")]
         | Annotated[Transfer, subcommand("transfer")]
         | Annotated[Seeding, subcommand("seeding")]
+        | Annotated[Engines, subcommand("engines")]
     )
 
     def run(self) -> None:

@@ -11,7 +11,9 @@ from tyro.conf import Positional
 if TYPE_CHECKING:
     from ..control import ControllerSpec
 
-Kind: TypeAlias = Literal["controllers", "robots", "gaits", "scenarios", "metrics", "suites"]
+Kind: TypeAlias = Literal[
+    "controllers", "robots", "gaits", "scenarios", "engines", "metrics", "suites"
+]
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,16 @@ def _scenarios() -> Iterator[tuple[str, str]]:
         yield name, "announced by an installed package"
 
 
+def _engines() -> Iterator[tuple[str, str]]:
+    from .._registry import announced_names
+    from ..compare import ENGINES
+
+    for name, engine in ENGINES.items():
+        yield name, (type(engine).__doc__ or "").partition("\n")[0]
+    for name in announced_names("engine"):
+        yield name, "announced by an installed package"
+
+
 def _metrics() -> Iterator[tuple[str, str]]:
     from .._registry import announced_names
     from ..compare.metrics import METRICS
@@ -131,6 +143,7 @@ _LISTS: dict[Kind, Callable[[], Iterator[tuple[str, str]]]] = {
     "robots": _robots,
     "gaits": _gaits,
     "scenarios": _scenarios,
+    "engines": _engines,
     "metrics": _metrics,
     "suites": _suites,
 }

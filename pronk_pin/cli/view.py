@@ -47,6 +47,8 @@ class View:
     """Results folder or gait library; by default the shipped gaits."""
     speed: float | None = None
     """Speed [m/s]; by default the one nearest to 0.5."""
+    command: str | None = None
+    """Speed profile of a result of commanded speeds; by default the first."""
     apex: float | None = None
     """Apex of a gait library [m]; by default the library's own."""
     controller: str | None = None
@@ -54,8 +56,9 @@ class View:
     scenario: str | None = None
     """Scenario of a result; by default the first."""
     beside: str | None = None
-    """Robot to show beside it: another controller of the result, or 'before learning'; by
-    default none."""
+    """Robot to show beside it: another controller of the result, 'PD and the model', 'before
+    learning', or 'nothing'; by default PD and the model, as far as the result has them, beside
+    one that learns."""
     stride: int | None = None
     """Show the dozen strides of a result with this one; by default those around the start of
     learning."""
@@ -88,7 +91,7 @@ class View:
         """Do it."""
         from .._checks import NOT_NEGATIVE, none_or, real, whole
         from ..viz import Film, serve, write_film, write_png, write_replay
-        from ..viz.player import DURATION, known_port
+        from ..viz.player import DURATION, check_film, known_port
 
         film = Film(**self.film)
         known_port(self.port)
@@ -96,6 +99,9 @@ class View:
         for name in ("speed", "apex"):
             none_or(real, name, getattr(self, name))
         none_or(whole, "stride", self.stride, NOT_NEGATIVE)
+        for path in (self.png, self.gif, self.mp4):
+            if path is not None:
+                check_film(path)  # what is missing is told before anything is read or drawn
         menu = self._menu()
         if self.html is not None:
             print(f"replay  {write_replay(menu, self.html)}")
@@ -136,6 +142,7 @@ class View:
                 scenario=self.scenario,
                 beside=self.beside,
                 stride=self.stride,
+                command=self.command,
             )
         if self.what is not None and not self.what.exists() and self.what.suffix != ".npz":
             raise FileProblem(
@@ -144,7 +151,7 @@ class View:
                 "make the one with 'pronk-pin compare --folder', the other with 'pronk-pin gaits "
                 "build --output'",
             )
-        self._refuse(("controller", "scenario", "beside", "stride"), "a results folder")
+        self._refuse(("command", "controller", "scenario", "beside", "stride"), "a results folder")
         library = open_library(self.what, self.robot, self.gait, self.base)
         return library_menu(
             library, speed=self.speed, apex=self.apex, robot=robot_of(library, self.robot)

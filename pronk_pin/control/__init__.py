@@ -5,6 +5,7 @@ Goes out: a `Tape` for each phase, and torque at each tick where the base is fre
 """
 
 from ..robot import BASES
+from .command_following import check_follows
 from .controller import Controller
 from .controller_spec import CONTROLLERS, ControllerSpec, load_controller
 from .feedback import (
@@ -132,6 +133,7 @@ __all__ = [
     "anti_windup",
     "attitude_angle",
     "attitude_error",
+    "check_follows",
     "clip_torque",
     "level_robot",
     "lifted_model",

@@ -17,6 +17,7 @@ from ..errors import InvalidInput
 from ..gait import Gait, known_gaits
 from ..kinematics import leg_geometry, rotate_leg
 from ..robot import BASES, Robot, as_array, as_numbers
+from .command_following import CommandFollower
 from .controller_spec import ControllerSpec
 from .feedback import SpeedEstimator
 from .learning import (
@@ -33,6 +34,7 @@ from .learning import (
 )
 from .prediction import StrideSettings, lifted_model
 from .signals import (
+    LATEST_TOUCHDOWN,
     PARTS,
     SAMPLES,
     FlightTiming,
@@ -46,10 +48,6 @@ from .signals import (
 )
 from .speed_command import SpeedCommand, lift_off_speed
 from .tick_control import ControlTime, TickLoop
-
-LATEST_TOUCHDOWN = 2.0
-"""Longest flight, over its planned duration, after which it ends without a touchdown."""
-
 
 _LATE_TOUCHDOWN = 1.2
 """Length of a flight's tape, over that of its reference; beyond it the last tick is held."""
@@ -151,9 +149,7 @@ class Controller:
         self._always_retimes = flight is None and not any(self._laws)
         self._thigh = leg_geometry(robot).sense[:, 1]  # sense in which the thighs turn legs back
         self._lift_off_speed = np.array([lift_off_speed(gait) for gait in gaits])
-        self._command = self._followed(command)
-        self._landing_gaits = list(self.gaits)  # those that are flown to
-        self._standing_speed = np.array([gait.speed for gait in gaits])
+        self._following = None if command is None else self._follower(command)
 
     def _context(self) -> LawContext:
         """What balance and the law of the stance are bound to."""
@@ -213,16 +209,16 @@ class Controller:
             late: Ticks ago that they touched down; by default those of the specification.
         """
         usable = self.skipped[rows] == 0
-        command = self._command
-        before = None if command is None else self._memory_of(rows)
+        before = None if self._following is None else self._memory_of(rows)
         learns = np.zeros(len(rows), dtype=bool)
         if learning is not None:
             learns = usable & learning
             learns[learning] &= ~self._roll_back(rows[learning], usable[learning])
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
-        if command is not None and before is not None:
-            self._change_stances(command, rows, before)
+        if self._following is not None and before is not None:
+            self._following.touchdown(rows, before)
+            self.gaits = self._following.gaits
         reference, position = self._stance, self._stance.position[rows]
         acceleration, phase = self._of_the_tick(reference, rows, slice(None))
         return Tape(
@@ -235,61 +231,25 @@ class Controller:
             phase=phase,
         )
 
-    def _followed(self, command: SpeedCommand | None) -> SpeedCommand | None:
-        """A command that this controller can follow.
+    def _follower(self, command: SpeedCommand) -> CommandFollower:
+        """What lets the robots follow a command.
 
         Raises:
-            InvalidInput: It cannot.
+            InvalidInput: They cannot.
         """
-        if command is not None and (self.balance is not None or self.guard is not None):
+        if self.balance is not None:
             raise InvalidInput(
-                f"controller '{self.spec.name}' cannot change its gait: what balances a trunk that "
-                "may turn, and the guard of the learning, are of one gait; use base 'locked', and "
-                "a controller with guard=None"
+                f"controller '{self.spec.name}' cannot change its gait on base '{self._base}', as "
+                "the balance of a trunk that may turn is of one gait; use base 'locked'"
             )
-        return command
-
-    def _change_flights(
-        self, command: SpeedCommand, rows: IntArray, commanded: Array, measured: Array
-    ) -> None:
-        """Fly to the touchdowns of other gaits."""
-        change = command.change(rows, commanded, measured)
-        self._flight.change(rows, [gait.flight for gait in change.gaits], LATEST_TOUCHDOWN)
-        stretch = command.memory.stretch_at(rows, change.speed)
-        self._flight.stretch(rows, stretch * self._flight.planned[rows])
-        self._lift_off_speed[rows] = change.lift_off_speed
-        self.feedforward[rows, 1] = command.memory.at(rows, change.speed, 1)
-        for row, gait in zip(rows, change.gaits, strict=True):
-            self._landing_gaits[row] = gait
-
-    def _change_stances(self, command: SpeedCommand, rows: IntArray, before: Memory) -> None:
-        """Stand in the gaits that were flown to, after what came on top of the torques and timings
-        `before` was stored."""
-        memory, landed = command.memory, command.speed[rows]
-        learned = self.feedforward[rows] - before.feedforward
-        memory.teach(rows, self._standing_speed[rows], 0, learned[:, 0])
-        memory.teach(rows, landed, 1, learned[:, 1])
-        longer = (self._flight.duration[rows] - before.flight) / self._flight.planned[rows]
-        memory.teach_stretch(rows, landed, longer)
-        self._standing_speed[rows] = landed
-        self.feedforward[rows, 0] = memory.at(rows, landed, 0)
-        self._stance.change(rows, [self._landing_gaits[row].stance for row in rows], 1.0)
-        self.gaits = tuple(self._landing_gaits)
-
-    def _joined(
-        self, rows: IntArray, began: Array, position: Array, velocity: Array
-    ) -> tuple[Array, Array]:
-        """Flights that begin where those of the gaits before do (m, 12), and go over to their own.
-
-        What lies between goes as the regulation comes, with `1 - profile`.
-        """
-        reference = self._flight
-        phase = reference.phase[rows, : position.shape[1]]
-        share, rate = self.spec.regulator.profile(phase)
-        between = (began - reference.position[rows, 0])[:, None]
-        return (
-            position + (1.0 - share)[..., None] * between,
-            velocity - (rate / reference.duration[rows, None])[..., None] * between,
+        return CommandFollower(
+            command,
+            self.robot,
+            self.spec,
+            gaits=self.gaits,
+            stance=self._stance,
+            flight=self._flight,
+            feedforward=self.feedforward,
         )
 
     def _of_the_tick(
@@ -322,8 +282,15 @@ class Controller:
         if self.balance is not None:
             self.balance.lift_off(rows, self._estimator.sideways[rows])
         began = self._flight.position[rows, 0]  # where the stances end
-        if self._command is not None and commanded is not None:
-            self._change_flights(self._command, rows, commanded, speed)
+        following = self._following if commanded is not None else None
+        if following is not None and commanded is not None:
+            self._lift_off_speed[rows] = following.lift_off(
+                rows,
+                commanded,
+                speed,
+                rising=self._estimator.upward[rows],
+                joints=log.joints[np.arange(len(rows)), log.length - 1],
+            )
         turn = self.spec.regulator.turn(speed - self._lift_off_speed[rows])[:, None]
         reference = self._flight
         ticks = slice(int(_LATE_TOUCHDOWN * reference.ends(rows).max()))
@@ -332,8 +299,8 @@ class Controller:
         position = rotate_leg(self.robot, reference.position[rows, ticks], share[..., None])
         velocity = reference.velocity[rows, ticks]
         velocity[..., 1::3] += self._thigh * rate[..., None]
-        if commanded is not None:
-            position, velocity = self._joined(rows, began, position, velocity)
+        if following is not None:
+            position, velocity = following.joined(rows, began, position, velocity)
         acceleration, phase = self._of_the_tick(reference, rows, ticks)
         if acceleration is not None and phase is not None:
             curvature = self.spec.regulator.profile_curvature(phase)

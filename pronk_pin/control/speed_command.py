@@ -138,14 +138,15 @@ class SpeedCommand:
         speeds = library.speeds if torque is None else torque.speeds
         self._slowest = float(max(speeds[0], library.speeds[0]))
         self._fastest = float(min(speeds[-1], library.speeds[-1]))
-        for speed in {speed for profile in self.profiles for speed in profile.speeds}:
-            if not self._slowest <= speed <= self._fastest:
-                raise SpeedOutOfRange(speed, self._slowest, self._fastest)
+        for profile in self.profiles:
+            for speed in (profile.slowest, profile.fastest):
+                if not self._slowest <= speed <= self._fastest:
+                    raise SpeedOutOfRange(speed, self._slowest, self._fastest)
         self.speed = np.array([float(profile.speeds[0]) for profile in self.profiles])
         self.memory = self._memory(speeds, torque)
 
     def _memory(self, speeds: Array, torque: TorqueLibrary | None) -> SpeedMemory:
-        n, gaits = len(self.profiles), self._gaits(speeds)
+        n, gaits = len(self.profiles), self.gaits_at(speeds)
         if torque is None:
             joints = gaits[0].stance.joints.shape[0]
             none = np.zeros((len(gaits), len(PARTS), SAMPLES, joints))
@@ -156,7 +157,12 @@ class SpeedCommand:
     @property
     def first_gaits(self) -> list[Gait]:
         """The gaits that the robots begin with."""
-        return self._gaits(self.speed)
+        return self.gaits_at(self.speed)
+
+    @property
+    def speeds(self) -> Array:
+        """Speeds of the library [m/s]."""
+        return self._library.speeds
 
     @property
     def all_gaits(self) -> tuple[Gait, ...]:
@@ -188,10 +194,11 @@ class SpeedCommand:
         speed = commanded if self.reference == "commanded" else measured
         speed = np.where(np.isfinite(speed), speed, commanded)
         speed = np.clip(speed, self._slowest, self._fastest)
-        gaits = self._gaits(speed)
-        wanted = gaits if self.reference == "commanded" else self._gaits(commanded)
+        gaits = self.gaits_at(speed)
+        wanted = gaits if self.reference == "commanded" else self.gaits_at(commanded)
         self.speed[rows] = speed
         return GaitChange(gaits, speed, np.array([lift_off_speed(gait) for gait in wanted]))
 
-    def _gaits(self, speeds: Array) -> list[Gait]:
+    def gaits_at(self, speeds: Array) -> list[Gait]:
+        """The gaits of some speeds [m/s]."""
         return [self._library.at(float(speed), self._apex) for speed in speeds]

@@ -8,7 +8,7 @@ from .audit import BezierLoss, audit, bezier_orders
 from .build import build_library
 from .checks import Audit, Check
 from .describe import describe_gait, describe_library
-from .gait import Gait, GaitPhase, Motion, known_gaits
+from .gait import Gait, GaitPhase, Motion, joint_references, known_gaits
 from .library import GaitLibrary, load_library, shipped_libraries
 from .optimisation import GaitSolution, SolverState, optimize_gait, vertical_hop
 from .problem import BOUND, PRONK, ContactPhase, GaitProblem
@@ -41,6 +41,7 @@ __all__ = [
     "describe_library",
     "gait_problem",
     "gait_residual",
+    "joint_references",
     "known_base",
     "known_gaits",
     "load_library",

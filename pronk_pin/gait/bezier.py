@@ -5,6 +5,8 @@ Coefficients stand in the last axis: `(..., order + 1)`. The phase `s` runs from
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.special import comb
 
@@ -15,7 +17,13 @@ def bernstein(s: Array, order: int) -> Array:
     """Evaluate the Bernstein polynomials of an order at the phases s, (len(s), order + 1)."""
     s = np.atleast_1d(np.asarray(s, dtype=float))
     rising, falling = np.vander(s, order + 1, increasing=True), np.vander(1.0 - s, order + 1)
-    return np.asarray(comb(order, np.arange(order + 1)) * rising * falling)
+    return np.asarray(_binomials(order) * rising * falling)
+
+
+@lru_cache(maxsize=64)
+def _binomials(order: int) -> Array:
+    """The binomial coefficients C(order, i); they must not be written to."""
+    return np.asarray(comb(order, np.arange(order + 1)))
 
 
 def evaluate(coefficients: Array, s: Array, *, derivative: int = 0) -> Array:

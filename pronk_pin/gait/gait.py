@@ -190,6 +190,33 @@ class GaitPhase(Displayed):
         )
 
 
+def joint_references(
+    parts: Sequence[GaitPhase], phases: Sequence[Array]
+) -> list[tuple[Array, Array]]:
+    """`GaitPhase.joint_reference` of several parts, each at phases of its own: to the bit the same.
+
+    Polynomials of one order are evaluated at all phases at once, which is several times as fast.
+    """
+    orders = {part.joints.shape[-1] - 1 for part in parts}
+    if len(orders) != 1:
+        return [part.joint_reference(s) for part, s in zip(parts, phases, strict=True)]
+    (order,) = orders
+    s, cuts = np.concatenate(phases), np.cumsum([len(s) for s in phases])[:-1]
+    bases = zip(
+        parts,
+        np.split(bezier.bernstein(s, order), cuts),
+        np.split(bezier.bernstein(s, max(order - 1, 0)), cuts),
+        strict=True,
+    )
+    return [
+        (
+            np.dot(basis, part.joints.T),
+            np.dot(rates, bezier.differentiate(part.joints).T) / part.duration,
+        )
+        for part, basis, rates in bases
+    ]
+
+
 @dataclass(frozen=True, repr=False)
 class Gait(Displayed):
     """A periodic motion of a robot at one speed.

@@ -113,12 +113,12 @@ class GaitLibrary(Displayed):
         """Name of the robot."""
         return self.gaits[0].robot
 
-    @property
+    @cached_property
     def speeds(self) -> Array:
         """Speeds of the grid [m/s], increasing, shape (n,)."""
         return _distinct(gait.speed for gait in self.gaits)
 
-    @property
+    @cached_property
     def apexes(self) -> Array:
         """Apex heights of the grid [m], increasing, shape (m,)."""
         return _distinct(gait.apex for gait in self.gaits)
@@ -418,7 +418,10 @@ def _known_gaits(gaits: Any) -> tuple[Gait, ...]:
 def _distinct(values: Iterable[float]) -> Array:
     """Values in increasing order, those that are one but for round-off once."""
     ordered = np.array(sorted(values))
-    return ordered[np.concatenate([[True], np.diff(ordered) > _SAME])] if ordered.size else ordered
+    if ordered.size:
+        ordered = ordered[np.concatenate([[True], np.diff(ordered) > _SAME])]
+    ordered.flags.writeable = False
+    return ordered
 
 
 def _index(grid: Array, value: float, name: str, else_: str = "") -> int:

@@ -12,11 +12,14 @@ import io
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, Literal, ParamSpec, TypeVar
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..errors import InvalidInput
 from ..storage import write_file
@@ -166,13 +169,14 @@ def known_format(suffix: str) -> str:
     return suffix
 
 
-def known_figure(path: Path) -> Path:
-    """The path itself, if a figure can be written there in the format of its suffix.
+def known_figure(path: Path | None) -> Path | None:
+    """The path itself, if a figure can be written there in the format of its suffix, or none is.
 
     Raises:
         InvalidInput: It cannot.
     """
-    known_format(path.suffix.removeprefix("."))
+    if path is not None:
+        known_format(path.suffix.removeprefix("."))
     return path
 
 
@@ -188,6 +192,22 @@ def legend_below(figure: Figure, handles: Iterable[Any], labels: Iterable[str]) 
         return
     columns = min(len(shown), 4)
     figure.legend(list(handles), shown, loc="outside lower center", ncols=columns)
+
+
+def log_axis(axes: Axes, axis: Literal["x", "y"] = "y") -> None:
+    """A logarithmic axis with plain numbers, as far as something is drawn: 0.02, not 2e-2."""
+    drawn = [line.get_data()[axis == "y"] for line in axes.lines]
+    if not any(np.any(np.asarray(values, dtype=float) > 0.0) for values in drawn):
+        return
+    axes.set_yscale("log") if axis == "y" else axes.set_xscale("log")
+    plain_ticks(axes.yaxis if axis == "y" else axes.xaxis)
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5 times powers of ten, as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def say(axes: Axes, words: str) -> None:

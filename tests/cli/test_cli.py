@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import re
 import runpy
+import zlib
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -75,7 +79,10 @@ def test_summary_is_one_long_sorted_table(result: Path) -> None:
 def test_pages_need_nothing_from_outside(result: Path) -> None:
     for name in ("report.html", "replay.html"):
         text = (result / name).read_text()
-        assert not re.search(r"""(src|href)=["'](?!data:|#)""", text), name
+        assert not re.search(r"""src=["'](?!data:)""", text), name
+        for address in re.findall(r"""href=["'](?!data:|#)([^"'#]+)""", text):
+            assert (result / address).exists(), address  # links lead to what is in the folder
+    assert 'href="replay.html' in (result / "report.html").read_text()
 
 
 def test_one_speed_and_one_controller_are_a_comparison_too(
@@ -125,14 +132,42 @@ def test_compare_again_takes_what_is_there(
     assert [file.stat().st_mtime_ns for file in files] == before
 
 
-def test_view_writes_a_result_or_a_gait_to_a_file(result: Path, tmp_path: Path) -> None:
-    for name, arguments in (
-        ("result", [str(result), "--speed", "0.4", "--controller", "pd"]),
-        ("gait", ["--speed", "-0.25"]),
-    ):
-        path = tmp_path / f"{name}.html"
-        assert main(["view", *arguments, "--html", str(path)]) == 0
-        assert path.stat().st_size < 5_000_000
+def first_film(page: Path) -> dict[str, Any]:
+    """The scene that a page begins with, its arrays as their shapes and ranges."""
+    text = page.read_text()
+    films = json.loads(re.search(r"const films = (\{.*?\});\n", text, re.DOTALL)[1])  # type: ignore[index]
+    data = zlib.decompress(base64.b64decode(next(iter(films.values()))))
+    length = int.from_bytes(data[:4], "little")
+    return dict(json.loads(data[4 : 4 + length]))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "title", "speed", "tracks"),
+    [
+        ("RESULT --speed 0.4 --controller pd", "A1 pronking at 0.4 m/s", 0.4, ["PD"]),
+        ("RESULT --speed 0.0 --controller ilc", "A1 pronking at 0 m/s", 0.0, ["ILC"]),
+        ("--speed -0.25", "A1 pronk", -0.25, []),
+        ("--robot solo12 --speed 0.2", "SOLO12 pronk", 0.2, []),
+    ],
+)
+def test_view_writes_a_result_or_a_gait_to_a_file(
+    arguments: str, title: str, speed: float, tracks: list[str], result: Path, tmp_path: Path
+) -> None:
+    """Read back: the robot, how fast it goes, and beside what."""
+    path = tmp_path / "page.html"
+    words = arguments.replace("RESULT", str(result)).split()
+    assert main(["view", *words, "--html", str(path)]) == 0
+    assert path.stat().st_size < 5_000_000
+    film = first_film(path)
+    assert film["title"] == title
+    names = [track["name"] for track in film["tracks"]]
+    assert names == [name for one in tracks for name in (one, f"reference of {one}")] or not tracks
+    for track in film["tracks"]:
+        q = track["q"]
+        frames, duration = q["shape"][0], (q["shape"][0] - 1) / film["fps"]
+        assert frames > 100
+        went = 65534 * q["step"][0]  # from its least to its greatest x
+        assert went == pytest.approx(abs(speed) * duration, abs=0.12)
 
 
 def test_gaits_show_proves_every_gait(capsys: pytest.CaptureFixture[str]) -> None:
@@ -146,7 +181,7 @@ def test_gaits_show_proves_every_gait(capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["gaits", "show", "0.3", "--gait", "bound"]) == 0
     assert "rear stance: 0.100 s on RL, RR" in capsys.readouterr().out
     assert main(["gaits", "show", "0.35", "--apex", "0.335"]) == 0
-    assert "the equations of motion lack" in capsys.readouterr().out
+    assert "+0.35 m/s, apex 0.335 m" in capsys.readouterr().out
 
 
 def test_gaits_build_makes_a_library_that_show_reads(
@@ -255,8 +290,8 @@ def test_bad_input_gets_one_line_with_the_remedy(
 
 
 def test_studies_of_other_robots_begin_with_speeds_that_their_gaits_cover() -> None:
-    assert _covered("bolt", (-0.4, -0.2, 0.0, 0.6, 0.8)) == (-0.2, 0.0, 0.6)
-    assert _covered("a1", (0.6, 0.8)) == (0.6, 0.8)
+    assert _covered("bolt", "pronk", (-0.4, -0.2, 0.0, 0.6, 0.8)) == (-0.2, 0.0, 0.6)
+    assert _covered("a1", "pronk", (0.6, 0.8)) == (0.6, 0.8)
 
 
 def test_a_file_in_the_way_of_the_folder_is_named(

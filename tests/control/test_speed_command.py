@@ -84,13 +84,13 @@ def test_a_robot_follows_a_ramp_with_the_gaits_of_its_command(
     count = int(strides.count[0])
     start = strides["start"][0, :count]
     late = start > 3.5
-    np.testing.assert_allclose(strides.commanded[0, :count][late], 0.5)
-    np.testing.assert_allclose(strides.gait_speed[0, :count][late], 0.5)
+    np.testing.assert_allclose(strides["commanded"][0, :count][late], 0.5)
+    np.testing.assert_allclose(strides["gait_speed"][0, :count][late], 0.5)
     assert np.abs(strides["mean_speed"][0, :count][late] - 0.5).max() < 0.06
     assert np.abs(strides["mean_speed"][0, :count][start < 1.5][2:] - 0.1).max() < 0.06
     # The gait is that of the speed that is commanded when the flight before it ends.
     np.testing.assert_allclose(
-        strides.gait_speed[0, 1:count], strides.commanded[0, 1:count], atol=0.01
+        strides["gait_speed"][0, 1:count], strides["commanded"][0, 1:count], atol=0.01
     )
 
 

@@ -471,3 +471,20 @@ def test_wrong_arguments_are_refused_with_a_remedy(robot: Robot) -> None:
         dynamics.contact_jacobian(robot, q, feet=("LF",))
     with pytest.raises(UnknownName, match="choose one of: point, rolling"):
         dynamics.contact_bias(robot, q, v, contact="sliding")
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+@pytest.mark.parametrize("feet", [None, (1,), (0, 2)])
+def test_feet_leave_an_impact_as_fast_as_the_restitution_says(
+    robot: Robot, random_states: Draw, contact: str, feet: tuple[int, ...] | None
+) -> None:
+    """J v+ = -e J v of the feet that hit, and the impulses alone change the momentum."""
+    legs = None if feet is None else [robot.legs[leg] for leg in feet]
+    for restitution in (0.0, 0.4, 1.0):
+        for q, v, _, _ in zip(*random_states(5), strict=True):
+            how = {"feet": legs, "contact": contact}
+            after = dynamics.impact(robot, q, v, restitution=restitution, **how)
+            jacobian = dynamics.contact_jacobian(robot, q, **how)
+            np.testing.assert_allclose(jacobian @ after.v, -restitution * jacobian @ v, atol=1e-9)
+            given = dynamics.mass_matrix(robot, q) @ (after.v - v)
+            np.testing.assert_allclose(given, jacobian.T @ after.impulse, atol=1e-9)

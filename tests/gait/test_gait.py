@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin.errors import InvalidInput
-from pronk_pin.gait import Gait, GaitPhase
+from pronk_pin.gait import Gait, GaitPhase, joint_references, load_library
 from pronk_pin.robot import Robot
 
 
@@ -54,3 +54,13 @@ def test_blend_is_linear_in_coefficients_and_durations(pitching: Gait) -> None:
 def test_a_phase_that_does_not_exist_is_named(pitching: Gait) -> None:
     with pytest.raises(InvalidInput, match="no phase 'trot'"):
         pitching.phase("trot")
+
+
+def test_references_of_several_parts_are_those_of_each_to_the_bit() -> None:
+    library, rng = load_library("a1"), np.random.default_rng(0)
+    parts = [library.at(speed).flight for speed in rng.uniform(-0.5, 0.8, 5)]
+    phases = [np.linspace(0.0, 1.0, count) for count in (7, 1, 200, 30, 2)]
+    together = joint_references(parts, phases)
+    for part, s, found in zip(parts, phases, together, strict=True):
+        for mine, own in zip(found, part.joint_reference(s), strict=True):
+            np.testing.assert_array_equal(mine, own)

@@ -248,3 +248,18 @@ def test_wrong_arguments_are_refused_with_a_remedy(robot: Robot) -> None:
         leg_odometry(robot, q, v, feet=())
     with pytest.raises(InvalidInput, match="does not fit"):
         rotate_leg(robot, q[7:], np.zeros(3))
+
+
+@pytest.mark.parametrize("contact", ["point", "rolling"])
+def test_odometry_holds_for_a_trunk_that_leans_and_turns(
+    any_robot: Robot, any_states: Draw, contact: str
+) -> None:
+    """A leg that stands alone, at any attitude: trunk's axes are not the world's."""
+    q, v, _, _ = any_states(30)
+    for row, leg in enumerate(np.arange(30) % 4):
+        foot, joints = (any_robot.legs[leg],), slice(6 + 3 * leg, 9 + 3 * leg)
+        jacobian = contact_jacobian(any_robot, q[row], feet=foot, contact=contact)
+        v[row, joints] = np.linalg.solve(jacobian[:, joints], -jacobian[:, :6] @ v[row, :6])
+        truth = rotation_matrix(q[row, 3:7]) @ v[row, :3]
+        found = leg_odometry(any_robot, q[row], v[row], feet=foot, contact=contact)
+        np.testing.assert_allclose(found, truth, atol=1e-8)

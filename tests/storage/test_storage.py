@@ -365,3 +365,11 @@ def test_a_temporary_folder_is_gone_at_the_end_and_its_absence_is_named(
         storage.temporary_folder(),
     ):
         pass
+
+
+def test_folders_that_are_missing_are_made_with_those_above_them(tmp_path: Path) -> None:
+    path = tmp_path / "some" / "new" / "folder" / "file.txt"
+    for text in ("first", "second"):  # the second time they are there
+        assert storage.write_file(path, text, remedy="choose another") == path
+        assert path.read_text() == text
+    assert list(path.parent.iterdir()) == [path]  # and nothing partial stays behind

@@ -5,11 +5,13 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from pronk_pin.compare import Experiment, Results, Schedule, run_experiment
 from pronk_pin.errors import NoBrowser
 from pronk_pin.robot import Robot, load_robot
 from pronk_pin.viz import Mark, Scene, Track
@@ -88,3 +90,15 @@ def scene(robot: Robot, hop: Track) -> Scene:
     ghost = Track("reference", hop.t, q, ghost=True)
     words = {"title": "Hop", "caption": "0.5 m/s <made by hand>"}
     return Scene(robot, (hop, ghost), **words, friction=0.6)
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """Two speeds and three controllers, a few seconds each."""
+    experiment = Experiment(
+        speeds=(0.0, 0.5),
+        controllers=("pd", "ilc", "model"),
+        schedule=Schedule(baseline=5.0, learning=6.0),
+    )
+    folder: Path = tmp_path_factory.mktemp("results") / "short"
+    return run_experiment(experiment, folder, workers=1, progress=False)

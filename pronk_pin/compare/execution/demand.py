@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from ...errors import InvalidInput
-from ..experiment import Experiment
+from ...gait import Gait
+from ..experiment import Cell, Experiment
 from ..simulation import SHORTER, check_memory, number_of_robots
+from ..world import engine_of
 
 LONGEST = 30.0
 """Days that an experiment may take, by a hopeful estimate."""
@@ -14,6 +18,18 @@ _QUICK = 25.0
 takes a minute on two cores for 14 robots, 5 controllers and 40.5 s. Tick by tick it is less."""
 
 _DAY = 86_400.0
+
+
+def check_engines(cells: Iterable[Cell]) -> None:
+    """Check that the engines of simulations are installed, and can do what is asked of them.
+
+    Raises:
+        UnknownName, InvalidInput, MissingExtra: One cannot; see `Engine.check`.
+    """
+    asked = {(cell.scenario, cell.seed): cell for cell in cells}
+    for cell in asked.values():
+        world = cell.world
+        engine_of(world).check(cell.experiment.model, world, cell.experiment.base)
 
 
 def check_demand(experiment: Experiment, workers: int) -> None:
@@ -26,13 +42,23 @@ def check_demand(experiment: Experiment, workers: int) -> None:
     Raises:
         InvalidInput: It does not, or does.
     """
-    gaits, cells = experiment.planned, len(experiment.cells())
-    duration = experiment.schedule.duration
-    check_memory(gaits, duration, at_once=min(workers, cells))
-    days = duration * len(gaits) * cells / _QUICK / workers / _DAY
+    cells = experiment.cells()
+    longest = max(cells, key=lambda cell: cell.schedule.duration * cell.robots)
+    gaits, duration = _gaits(longest), longest.schedule.duration
+    check_memory(gaits, duration, at_once=min(workers, len(cells)))
+    seconds = sum(cell.schedule.duration * cell.robots for cell in cells)
+    days = seconds / _QUICK / workers / _DAY
     if days > LONGEST:
         raise InvalidInput(
-            f"{cells} simulations of {number_of_robots(gaits)} over {duration:g} s take about "
+            f"{len(cells)} simulations of {number_of_robots(gaits)} over {duration:g} s take about "
             f"{days:.3g} days on {workers} cores, beyond {LONGEST:g} days; {SHORTER}, "
             "--controllers, --scenarios or --seeds"
         )
+
+
+def _gaits(cell: Cell) -> list[Gait]:
+    """Gaits of the robots of a cell; of a command the shortest that it may be."""
+    experiment = cell.experiment
+    if not cell.commands:
+        return experiment.planned_at(cell.speeds)
+    return [min(experiment.planned, key=lambda gait: gait.duration)] * cell.robots

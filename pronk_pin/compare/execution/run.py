@@ -38,7 +38,7 @@ from ..results import (
     remove_if_empty,
 )
 from ..simulation import Progress
-from .demand import check_demand
+from .demand import check_demand, check_engines
 from .executors import WorkerPool, connect, known_address, processes
 
 MAX_RETRIES = 3
@@ -82,7 +82,8 @@ def run_experiment(
             begun with other versions or another MJCF, or another run is writing there; or the MJCF
             cannot be read.
         InvalidInput: The MJCF is not of this robot, no worker is allowed, or the experiment is too
-            large: see `check_demand`.
+            large, see `check_demand`; or an engine cannot simulate a scenario.
+        MissingExtra: An engine is not installed.
         ExecutorUnavailable: The executor at that address cannot be used.
         WorkerLost: Workers ended in the middle of their work again and again.
         NoMainGuard: They ended at once, as the script that wants them guards no main code.
@@ -123,12 +124,14 @@ def _complete(
         _summarize(results, {})
         return  # who made the strides stays on record
     check_completion(results)
+    robots = len(results.experiment.commands or results.experiment.speeds)
+    check_engines(cells)
     with tqdm(
         total=sum(map(_robot_steps, cells)),
-        desc=f"simulating {len(results.experiment.speeds)} robots x {len(cells)}",
+        desc=f"simulating {robots} robots x {len(cells)}",
         unit=" robot-steps",
         unit_scale=True,
-        mininterval=0.5 if sys.stderr.isatty() else 10.0,
+        mininterval=0.5 if sys.stderr.isatty() else 60.0,
         disable=not progress or not cells,
     ) as bar:
         run = _Run(results, bar, set(cells))
@@ -148,7 +151,7 @@ def _summarize(results: Results, made: Mapping[Cell, CellSummary]) -> None:
             made[cell]
             if cell in made
             else summarize_cell(results.strides(cell), cell.experiment.own_metrics)
-            for cell in results.experiment.cells()
+            for cell in results.experiment.compared
         )
     )
 
@@ -218,7 +221,7 @@ class _Run:
     def here(self, cells: list[Cell]) -> None:
         """Run cells one after the other in this process."""
         for cell in cells:
-            robots = len(cell.speeds)
+            robots = cell.robots
             done = _make(cell, self._needed(cell), lambda n, m=robots: self.bar.update(n * m))  # type: ignore[misc]
             self._save(cell, done)
 
@@ -306,7 +309,7 @@ class _Run:
 
 
 def _robot_steps(cell: Cell) -> int:
-    return cell.steps * len(cell.speeds)
+    return cell.steps * cell.robots
 
 
 def _make(cell: Cell, dependency: xr.Dataset | None, progress: Progress) -> FinishedCell:
@@ -326,4 +329,4 @@ def _make(cell: Cell, dependency: xr.Dataset | None, progress: Progress) -> Fini
 
 def _work(cell: Cell, dependency: xr.Dataset | None) -> FinishedCell:
     """What a worker does."""
-    return _make(cell, dependency, lambda steps: count_steps(steps * len(cell.speeds)))
+    return _make(cell, dependency, lambda steps: count_steps(steps * cell.robots))

@@ -10,7 +10,12 @@ from .description import describe
 from .entries import name_of
 from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment
 from .experiment_file import GAITS, URDF, from_document, read_config, to_document
-from .initial_feedforward import LIBRARY_VARIABLES, initial_feedforward, torque_library
+from .initial_feedforward import (
+    LIBRARY_VARIABLES,
+    feedforward_by_speed,
+    initial_feedforward,
+    torque_library,
+)
 from .suites import SUITES, load_suite
 
 __all__ = [
@@ -26,6 +31,7 @@ __all__ = [
     "define",
     "describe",
     "differences",
+    "feedforward_by_speed",
     "fingerprint",
     "from_document",
     "initial_feedforward",

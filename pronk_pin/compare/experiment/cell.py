@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 
 from ..._checks import instance_of
-from ...control import ControlTime
-from ...gait import replan
+from ...control import ControlTime, SpeedCommand, TorqueLibrary
+from ...gait import Gait, GaitLibrary, replan
 from ...robot import robot_attributes, with_rotors
 from ..identification import explain
 from ..simulation import Progress, simulate
 from .definition import cell_definition, define, fingerprint, to_text
 from .experiment import Cell
-from .initial_feedforward import initial_feedforward, learned_strides
+from .initial_feedforward import feedforward_by_speed, initial_feedforward, learned_strides
 
 
 def run_cell(
@@ -43,19 +46,40 @@ def run_cell(
         model = with_rotors(robot)
     if spec.gait_model != "urdf":
         gaits = replan(model, gaits, base="locked" if base == "locked" else "sagittal")
+    command = None
+    if cell.commands:
+        command = _command(
+            cell, gaits, feedforward_by_speed(spec, gaits, model=model, learned=dependency)
+        )
+        gaits, initial = command.first_gaits, command.initial_feedforward
+        spec = dataclasses.replace(spec, guard=None)  # whose memory is of one speed
+    else:
+        initial = initial_feedforward(spec, gaits, model=model, learned=dependency, base=base)
     return simulate(
         robot,
         gaits,
         spec,
         cell.world,
-        schedule=experiment.schedule,
+        schedule=cell.schedule,
         # One stream a seed, the same for every controller: they start from the same postures.
         rng=np.random.default_rng(np.random.SeedSequence(cell.seed)),
-        initial=initial_feedforward(spec, gaits, model=model, learned=dependency, base=base),
+        initial=initial,
         base=base,
         attributes=_attributes(cell),
         progress=progress,
         control_time=control_time,
+        command=command,
+    )
+
+
+def _command(cell: Cell, gaits: Sequence[Gait], torque: TorqueLibrary | None) -> SpeedCommand:
+    """The commands of a cell: gaits of its speeds take the library's place if they are others."""
+    experiment = cell.experiment
+    library, apex = experiment.library, experiment.apex
+    if cell.spec.gait_model != "urdf":
+        library, apex = GaitLibrary(tuple(gaits), library.metadata), None
+    return SpeedCommand(
+        experiment.profiles, library, torque=torque, reference=experiment.reference, apex=apex
     )
 
 
@@ -72,7 +96,7 @@ def _attributes(cell: Cell) -> dict[str, str | int | float]:
         "mjcf": experiment.mjcf,
         "mjcf_sha256": definition["mjcf_sha256"],
         "timestep": scenario.timestep,
-        "switch": experiment.schedule.baseline,
+        "switch": cell.schedule.baseline,
         "definition": to_text(definition),
         "fingerprint": fingerprint(definition),
     }

@@ -51,6 +51,17 @@ def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definit
         "scenarios": {
             name: describe(experiment.scenario(name)) for name in experiment.scenario_names
         },
+        **(_driving(experiment) if experiment.commands else {}),
+    }
+
+
+def _driving(experiment: Experiment) -> Definition:
+    """What the numbers depend on where speeds are commanded: any gait may be played."""
+    return {
+        "commands": list(experiment.commands),
+        "reference": experiment.reference,
+        "apex": experiment.apex,
+        "library": experiment.library.sha256,
     }
 
 
@@ -65,12 +76,14 @@ def _robot(robot: Robot) -> Definition:
 def cell_definition(definition: Definition, cell: Cell) -> Definition:
     """What one simulation of an experiment depends on, out of the experiment's definition."""
     source = cell.depends_on
+    driving = ("commands", "reference", "apex", "library") if cell.commands else ()
     return {
         **{key: definition[key] for key in ("robot", "base", "mjcf_sha256", "schedule")},
         "gaits": {repr(speed): definition["gaits"][repr(speed)] for speed in cell.speeds},
         "controller": definition["controllers"][cell.controller],
         "scenario": definition["scenarios"][cell.scenario],
         "seed": cell.seed,
+        **{key: definition[key] for key in driving},
         "depends_on": "" if source is None else fingerprint(cell_definition(definition, source)),
     }
 

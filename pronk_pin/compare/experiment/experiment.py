@@ -1,7 +1,8 @@
 """An experiment: speeds x controllers x scenarios x seeds, as one frozen description.
 
-A cell of it is one simulation of all speeds under one controller, in one scenario, with one seed.
-What a cell gives depends on nothing but its description, so cells run in any order and resume.
+A cell of it is one simulation of all speeds, or of all commands, under one controller, in one
+scenario, with one seed. What a cell gives depends on nothing but its description, so cells run in
+any order and resume.
 """
 
 from __future__ import annotations
@@ -12,18 +13,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of
+import numpy as np
+
+from ..._checks import instance_of, known_name, none_or, path, real, seed, sequence_of, text
 from ..._display import Displayed, listed, spanned
+from ..._typing import Array
 from ...control import (
     CONTROLLERS,
     PARTS,
+    REFERENCES,
     ComputedTorque,
     ControllerSpec,
     ExtendedStateObserver,
+    SpeedProfile,
+    check_follows,
     level_robot,
     load_controller,
 )
-from ...errors import InvalidInput
+from ...errors import InvalidInput, SpeedOutOfRange
 from ...gait import STYLES, Gait, GaitLibrary, load_library
 from ...robot import (
     BASES,
@@ -36,8 +43,8 @@ from ...robot import (
     with_rotors,
 )
 from ..metrics import Metric, load_metric
-from ..simulation import Schedule
-from ..world import Scenario, load_scenario, shipped_scenario
+from ..simulation import SHORTEST, Schedule
+from ..world import DEFAULT_ENGINE, Scenario, load_scenario, shipped_scenario
 from .description import describe
 from .entries import digest_of, name_of, named, shortest
 
@@ -69,7 +76,9 @@ class Experiment(Displayed):
         gaits: Its gaits: "pronk", as shipped for it; or a `GaitLibrary`, or the file of one, as
             `pronk-pin gaits build` writes it.
         apex: Apex of the gaits [m], one that the library covers; by default the library's own.
-        speeds: Desired speeds [m/s]; by default all of the library.
+        speeds: Desired speeds [m/s]; by default all of the library. With commands, the speeds at
+            which is learned, and computed, what controllers begin with; by default those of the
+            library that the commands span.
         controllers: Controllers: any of `control.CONTROLLERS`, by name; a `ControllerSpec` of one's
             own, or its address, module:object. By default `DEFAULT_CONTROLLERS`, less those that
             need rotors which are not known of the robot.
@@ -80,10 +89,19 @@ class Experiment(Displayed):
             nothing is random they hardly differ; `rough` is the scenario for many.
         base: How the trunk may move: "locked" to x and z, "sagittal" with pitch, or "free".
         mjcf: MJCF of the robot, with the same joint names, that stands in for its URDF in the
-            simulation; see `compare.world.mjcf`. The scenarios add to what is in it: "ideal" takes
+            simulation; see `mjcf_spec`. The scenarios add to what is in it: "ideal" takes
             it as it is. The file is read when the experiment is run, and not before.
+        engine: Engine for all scenarios that name none, see `Scenario.engine`; from then on it
+            stands in the scenarios' names, and here it is empty.
         schedule: What happens when.
         metrics: Metrics of one's own, beside ours: `Metric` objects, or their addresses.
+        commands: Speeds that change, one robot each, instead of constant ones: speed profiles as
+            `control.SpeedProfile.parse` reads them, "0 4s, 0->0.8 2s, 0.8 4s", or their files. The
+            schedule is then that of the learning at constant speeds beforehand; robots are driven
+            as long as the longest command lasts, and those that learn do so all the time, without
+            a guard, whose memory is of one speed.
+        reference: With commands, the speed by which gaits are chosen: one of
+            `control.REFERENCES`.
         batches: Speeds that are simulated together, in the order in which they were added to a
             results folder; empty for all at once.
     """
@@ -97,8 +115,11 @@ class Experiment(Displayed):
     seeds: tuple[int, ...] = (0,)
     base: str = "locked"
     mjcf: str = ""
+    engine: str = ""
     schedule: Schedule = field(default_factory=Schedule)
     metrics: tuple[str | Metric, ...] = ()
+    commands: tuple[str, ...] = ()
+    reference: str = "commanded"
     batches: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
@@ -107,11 +128,18 @@ class Experiment(Displayed):
         keep(self, "robot", shortest("robot", load_robot_spec(self.robot), ROBOTS.get))
         keep(self, "gaits", self._known_gaits())
         if not self.speeds:
-            keep(self, "speeds", tuple(self.library.speeds.tolist()))
+            speeds = self.library.speeds
+            keep(self, "speeds", tuple(speeds[self._spanned(speeds)].tolist()))
         if not self.controllers:
             keep(self, "controllers", default_controllers(self.model))
         specs = [load_controller(value) for value in self.controllers]
         worlds = [load_scenario(value) for value in self.scenarios]
+        if self.engine:
+            worlds = [
+                world.in_engine(self.engine) if world.engine == DEFAULT_ENGINE else world
+                for world in worlds
+            ]
+        keep(self, "engine", "")
         keep_controllers = tuple(shortest("controller", spec, CONTROLLERS.get) for spec in specs)
         keep(self, "controllers", keep_controllers)
         keep(self, "scenarios", tuple(shortest("scenario", w, shipped_scenario) for w in worlds))
@@ -123,6 +151,7 @@ class Experiment(Displayed):
             "controllers": self.controller_names,
             "scenarios": self.scenario_names,
             "seeds": self.seeds,
+            **({"commands": self.commands} if self.commands else {}),
         }
         for name, values in lists.items():
             if len(values) == 0 or len(set(values)) != len(values):
@@ -140,12 +169,15 @@ class Experiment(Displayed):
                     f"these gaits have the phases {', '.join(names)}, and comparisons play "
                     f"{' and '.join(PARTS)} only; choose gaits 'pronk'"
                 )
+        self._check_commands()
         self._sort_batches()
 
     def __hash__(self) -> int:
         # Objects of one's own need not be hashable.
         names = (self.robot_name, self.controller_names, self.scenario_names)
-        return hash((names, self.speeds, self.seeds, self.base, self.mjcf, self.schedule))
+        return hash(
+            (names, self.speeds, self.commands, self.seeds, self.base, self.mjcf, self.schedule)
+        )
 
     def _title(self) -> str:
         return "Experiment"
@@ -159,6 +191,8 @@ class Experiment(Displayed):
             "robot": f"{self.robot_name}, base {self.base}",
             "gaits": (gaits if isinstance(gaits, str) else f"a library of {gaits.robot}") + apex,
             "speeds": spanned(self.speeds, "m/s"),
+            "commands": "; ".join(self.commands),
+            "gaits by": f"the {self.reference} speed" if self.commands else "",
             "controllers": listed(self.controller_names),
             "scenarios": listed(self.scenario_names),
             "seeds": listed(self.seeds),
@@ -178,6 +212,7 @@ class Experiment(Displayed):
             ("controllers", lambda _, value: value, 1000),
             ("scenarios", lambda _, value: value, 1000),
             ("metrics", lambda _, value: value, 1000),
+            ("commands", lambda _, words: str(SpeedProfile.parse(words)), 1000),
             ("seeds", seed, 10_000),
         ):
             values: tuple[object, ...] = sequence_of(name, getattr(self, name), check, wanted=name)
@@ -187,7 +222,9 @@ class Experiment(Displayed):
         keep(self, "apex", none_or(real, "apex", self.apex))
         if not isinstance(self.mjcf, str) or self.mjcf:
             keep(self, "mjcf", str(path("mjcf", self.mjcf)))
+        text("engine", self.engine)
         instance_of("schedule", self.schedule, Schedule)
+        known_name("speed of reference", self.reference, REFERENCES)
 
     def _known_gaits(self) -> str | GaitLibrary:
         """The name of gaits that are shipped, or a library of this robot."""
@@ -223,12 +260,47 @@ class Experiment(Displayed):
                     "out, or use base 'locked'"
                 )
 
+    def _spanned(self, speeds: Array) -> slice:
+        """Which of increasing speeds the commands need: all without any."""
+        if not self.commands:
+            return slice(None)
+        slowest = min(profile.slowest for profile in self.profiles)
+        fastest = max(profile.fastest for profile in self.profiles)
+        if not speeds[0] <= slowest <= fastest <= speeds[-1]:
+            beyond = slowest if slowest < speeds[0] else fastest
+            raise SpeedOutOfRange(beyond, float(speeds[0]), float(speeds[-1]))
+        first = int(np.searchsorted(speeds, slowest, side="right")) - 1
+        return slice(first, int(np.searchsorted(speeds, fastest)) + 1)
+
+    def _check_commands(self) -> None:
+        if not self.commands:
+            return
+        _ = self._spanned(np.array(self.speeds))  # which all of them are within
+        if self.base != "locked":
+            raise InvalidInput(
+                f"speeds are commanded on base 'locked' only, and this is '{self.base}'; leave the "
+                "commands out, or choose base 'locked'"
+            )
+        for spec in map(load_controller, self.controllers):
+            check_follows(spec)
+        for name, profile in zip(self.commands, self.profiles, strict=True):
+            if profile.duration < SHORTEST:
+                raise InvalidInput(
+                    f"command '{name}' of {profile.duration:g} s is too short for a stride; make "
+                    f"it {SHORTEST:g} s or more"
+                )
+
     def _sort_batches(self) -> None:
         batches = tuple(tuple(sorted(batch)) for batch in self.batches)
         together = tuple(sorted(speed for batch in batches for speed in batch))
         if batches and (together != self.speeds or not all(batches)):
             raise InvalidInput("batches must hold each speed once, and none of them may be empty")
         object.__setattr__(self, "batches", batches if len(batches) > 1 else ())
+
+    @property
+    def profiles(self) -> list[SpeedProfile]:
+        """The commanded speeds."""
+        return [SpeedProfile.parse(words) for words in self.commands]
 
     @property
     def robot_name(self) -> str:
@@ -338,6 +410,13 @@ class Experiment(Displayed):
         """The simulations, in an order in which each finds what it depends on done before it."""
         controllers = list(self.controller_names)
         later = [name for name in controllers if self.controller(name).source in LEARNED]
+        if self.commands:
+            places = [(scenario, seed) for scenario in self.scenario_names for seed in self.seeds]
+            practices = places if later else []
+            return (
+                *(Cell("ilc", *place, 0, self, practice=True) for place in practices),
+                *(Cell(name, *place, 0, self) for name in controllers for place in places),
+            )
         if later:
             others = [name for name in controllers if name not in ("ilc", *later)]
             controllers = ["ilc", *others, *later]
@@ -349,12 +428,18 @@ class Experiment(Displayed):
             for seed in self.seeds
         )
 
+    @property
+    def compared(self) -> tuple[Cell, ...]:
+        """The simulations that are compared: all but those that only others depend on."""
+        return tuple(cell for cell in self.cells() if not cell.practice)
+
 
 def _fixed(one: Experiment, other: Experiment) -> Iterator[tuple[str, object, object]]:
     """What cannot be added to: name, and its value in either of two experiments."""
     yield "robot", describe(one.robot), describe(other.robot)
     yield "gaits", digest_of(one.gaits), digest_of(other.gaits)
-    for name in ("apex", "base", "mjcf"):
+    driven = ("commands", "reference", "speeds") if one.commands or other.commands else ()
+    for name in ("apex", "base", "mjcf", *driven):
         yield name, getattr(one, name), getattr(other, name)
     for part in dataclasses.fields(Schedule):
         name = part.name
@@ -363,7 +448,8 @@ def _fixed(one: Experiment, other: Experiment) -> Iterator[tuple[str, object, ob
 
 @dataclass(frozen=True)
 class Cell:
-    """One simulation of an experiment: all speeds of a batch, one controller, scenario and seed.
+    """One simulation of an experiment: all commands, or all speeds of a batch, one controller,
+    scenario and seed.
 
     Attributes:
         controller: Name of the controller.
@@ -371,6 +457,7 @@ class Cell:
         seed: Seed of all that is random.
         batch: Index of the speeds among the experiment's batches.
         experiment: The experiment, with the objects of these names.
+        practice: Whether it is the learning at constant speeds before speeds are commanded.
     """
 
     controller: str
@@ -378,12 +465,32 @@ class Cell:
     seed: int
     batch: int
     experiment: Experiment = field(compare=False, repr=False)
+    practice: bool = False
 
     @property
     def name(self) -> str:
         """Name of the cell's file."""
-        later = f".{self.batch + 1}" if self.batch else ""
+        later = f".{self.batch + 1}" if self.batch else ".practice" if self.practice else ""
         return f"{self.controller}_{self.scenario}_{self.seed}{later}"
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Its commanded speeds; none where its speeds are constant."""
+        return () if self.practice else self.experiment.commands
+
+    @property
+    def robots(self) -> int:
+        """How many robots it simulates."""
+        return len(self.commands or self.speeds)
+
+    @property
+    def schedule(self) -> Schedule:
+        """What happens when; where speeds are commanded, as long as the longest command lasts."""
+        schedule = self.experiment.schedule
+        if not self.commands:
+            return schedule
+        longest = max(profile.duration for profile in self.experiment.profiles)
+        return dataclasses.replace(schedule, baseline=0.0, learning=longest)
 
     @property
     def speeds(self) -> tuple[float, ...]:
@@ -417,12 +524,13 @@ class Cell:
     @property
     def depends_on(self) -> Cell | None:
         """The cell that learns what this one uses: the torque library, or the identified model."""
-        if self.spec.source not in LEARNED:
+        if self.practice or self.spec.source not in LEARNED:
             return None
-        return dataclasses.replace(self, controller="ilc")
+        practice = bool(self.experiment.commands)
+        return dataclasses.replace(self, controller="ilc", practice=practice)
 
     @property
     def steps(self) -> int:
         """Time steps of the simulation."""
-        schedule = self.experiment.schedule
+        schedule = self.schedule
         return round((schedule.baseline + schedule.learning) / self.world.timestep)

@@ -40,17 +40,22 @@ class _Document:
     seeds: tuple[int, ...] | None = None
     base: str | None = None
     mjcf: str | None = None
+    engine: str | None = None
     schedule: Schedule | None = None
     metrics: tuple[str | dict[str, Any], ...] | None = None
+    commands: tuple[str, ...] | None = None
+    reference: str | None = None
     batches: tuple[tuple[float, ...], ...] | None = None
 
 
 def to_document(experiment: Experiment) -> dict[str, Any]:
     """The experiment as JSON has it; gaits of one's own are the file `GAITS` beside it."""
     whole = {part.name: getattr(experiment, part.name) for part in dataclasses.fields(experiment)}
+    del whole["engine"]  # it stands in the scenarios
     own = not isinstance(experiment.gaits, str)
+    constant = () if experiment.commands else ("commands", "reference")
     return {
-        **whole,
+        **{name: value for name, value in whole.items() if name not in constant},
         "robot": describe(experiment.robot),
         "gaits": GAITS if own else experiment.gaits,
         "controllers": describe(experiment.controllers),
@@ -88,6 +93,11 @@ def from_document(document: object, path: Path, remedy: str) -> Experiment:
         value = fields.get(name)
         if isinstance(value, str) and value and (path.parent / value).is_file():
             fields[name] = str(path.parent / value)
+    if known.commands is not None:
+        fields["commands"] = tuple(
+            str(path.parent / words) if words.endswith(".csv") else words
+            for words in known.commands
+        )
     return Experiment(**fields)
 
 

@@ -62,6 +62,33 @@ def initial_feedforward(
     return InitialFeedforward()
 
 
+def feedforward_by_speed(
+    spec: ControllerSpec, gaits: Sequence[Gait], *, model: Robot, learned: xr.Dataset | None = None
+) -> TorqueLibrary | None:
+    """Torques that a controller begins with, at the speeds of some gaits; None without any.
+
+    Args:
+        spec: The controller.
+        gaits: The gaits, of increasing speeds.
+        model: The robot as the model knows it: the identified one where that is the source.
+        learned: Strides of the learning at these speeds.
+
+    Raises:
+        InvalidInput: The torques are to be learned ones, and there are no strides.
+    """
+    if spec.source == "none":
+        return None
+    if spec.source == "library":
+        return torque_library(learned_strides(spec, learned))
+    torque = model_feedforward(model, gaits)
+    return TorqueLibrary(
+        np.array([gait.speed for gait in gaits]),
+        torque,
+        np.zeros_like(torque),
+        np.array([gait.flight.duration for gait in gaits]),
+    )
+
+
 def learned_strides(spec: ControllerSpec, strides: xr.Dataset | None) -> xr.Dataset:
     """The strides that a controller's source of feedforward is learned from.
 

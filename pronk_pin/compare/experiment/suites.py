@@ -47,13 +47,23 @@ SUITES: Mapping[str, Mapping[str, Any]] = {
         "scenarios": ("rough",),
         "seeds": tuple(range(8)),
     },
+    "engines": {
+        "speeds": (-0.4, -0.1, 0.2, 0.5, 0.8),
+        "controllers": ("pd", "ilc", "ilc+rotors", "model", "model+rotors", "library"),
+        "scenarios": tuple(
+            f"{world}{engine}"
+            for world in ("ideal", "nominal", "payload")
+            for engine in ("", "+drake")
+        ),
+    },
     "paper": {"controllers": ("pd", "ilc", "ilc-paper")},
 }
 """Changes of each suite to `Experiment()`: the paper's speeds under `DEFAULT_CONTROLLERS`; what a
 model must know to be as good as practice, scenario by scenario; long learning in every pair of the
 list of mismatches; the paper's speeds in every scenario of that list; learning against the model in
 20 sampled scenarios, at four speeds only, as the worlds are the sample; the control arm, which
-learns with gain 0, on rough ground, where seeds differ; Table I, with the paper's own law."""
+learns with gain 0, on rough ground, where seeds differ; whether another engine says the same, side
+by side; Table I, with the paper's own law."""
 
 
 def load_suite(name: str, **changes: Any) -> Experiment:

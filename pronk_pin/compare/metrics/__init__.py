@@ -4,17 +4,23 @@ Comes in: strides as an `xarray.Dataset`.
 Goes out: rows of the summary, intervals and comparisons, and the paper's Table I.
 """
 
+from .cell_summary import CellSummary, by_command, join_summaries, summarize_cell
+from .command_metrics import (
+    COMMAND_COLUMNS,
+    COMMAND_KEYS,
+    STARTED,
+    stride_table,
+    summarize_commands,
+)
 from .metrics import (
     COLUMNS,
     KEYS,
     STEADY_STRIDES,
     VARIABLES,
-    CellSummary,
     by_joint,
     family,
     feedback_share,
     in_family,
-    join_summaries,
     of_first_leg,
     peak_history,
     reduction,
@@ -24,7 +30,6 @@ from .metrics import (
     steady,
     strides_to_converge,
     summarize,
-    summarize_cell,
 )
 from .own_metrics import METRICS, Metric, load_metric
 from .paper_table import of_papers_robot, table_1
@@ -50,6 +55,8 @@ from .time_to_beat import (
 
 __all__ = [
     "COLUMNS",
+    "COMMAND_COLUMNS",
+    "COMMAND_KEYS",
     "CONFIDENCE",
     "KEYS",
     "LEARNER",
@@ -57,6 +64,7 @@ __all__ = [
     "METRICS",
     "NO_INTERVAL",
     "RIVAL",
+    "STARTED",
     "STEADY_STRIDES",
     "VARIABLES",
     "CellSummary",
@@ -65,6 +73,7 @@ __all__ = [
     "PeakHistory",
     "beat_rows",
     "beaten",
+    "by_command",
     "by_joint",
     "compare_controllers",
     "compare_pairs",
@@ -84,9 +93,11 @@ __all__ = [
     "sampled",
     "settling_stride",
     "steady",
+    "stride_table",
     "strides_to_converge",
     "summarize",
     "summarize_cell",
+    "summarize_commands",
     "table_1",
     "unit_of",
 ]

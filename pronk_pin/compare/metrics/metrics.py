@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ from ...control import SKIPPED
 from ...robot import JOINTS
 from .effort import effort
 from .own_metrics import Metric
-from .time_to_beat import JUDGED, PeakHistory, beat_rows
+from .time_to_beat import JUDGED, PeakHistory
 
 STEADY_STRIDES = 30
 """Strides at the end of a simulation that count as steady state (paper, section III.B), if there
@@ -294,28 +294,6 @@ def peak_history(strides: xr.Dataset) -> PeakHistory:
         if strides.sizes["stride"]
         else np.full(len(count), np.nan),
     )
-
-
-class CellSummary(NamedTuple):
-    """What one simulation gives to the summary of its experiment."""
-
-    rows: pd.DataFrame
-    """Its own rows: see `summarize`."""
-    peaks: PeakHistory
-    """What its rows relative to another simulation are made of."""
-
-
-def summarize_cell(strides: xr.Dataset, own_metrics: Sequence[Metric] = ()) -> CellSummary:
-    """Compute what one simulation gives to the summary of its experiment."""
-    return CellSummary(summarize(strides, own_metrics), peak_history(strides))
-
-
-def join_summaries(cells: Iterable[CellSummary]) -> pd.DataFrame:
-    """The summary of an experiment: the rows of each simulation, and those relative to another."""
-    cells = list(cells)
-    relative = pd.DataFrame(beat_rows([cell.peaks for cell in cells]), columns=COLUMNS)
-    full = [table for table in (*(cell.rows for cell in cells), relative) if len(table)]
-    return pd.concat(full).sort_values(KEYS, ignore_index=True)[COLUMNS]
 
 
 def reduction(summary: pd.DataFrame, metric: str) -> pd.DataFrame:

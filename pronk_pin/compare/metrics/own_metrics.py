@@ -53,7 +53,7 @@ class Metric:
         name: Its name in summary, tables and comparisons.
         unit: Its unit; "1" without one.
         compute: From the strides, see `compare.simulation.dataset`, to values of shape (n,), one a
-            speed. NaN where there is nothing to say.
+            speed, or command. NaN where there is nothing to say.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Metric:
         Raises:
             InvalidInput: The function answers something else.
         """
-        answer, n = self.compute(strides), strides.sizes["speed"]
+        answer, n = self.compute(strides), strides["count"].size
         try:
             values = np.asarray(answer, dtype=np.float64)
         except (TypeError, ValueError) as error:
@@ -85,7 +85,7 @@ class Metric:
         if values.shape != (n,):
             raise InvalidInput(
                 f"metric '{self.name}' answers values of shape {values.shape}; let it answer one "
-                f"for each of the {n} speeds, ({n},)"
+                f"for each of the {n} robots, ({n},)"
             )
         return values
 

@@ -4,7 +4,13 @@ Comes in: a summary, or `Results`.
 Goes out: tables and text for a terminal and for the report.
 """
 
+from .between_engines import (
+    errors_between_engines,
+    format_between_engines,
+    winners_between_engines,
+)
 from .cells import against_model, beat_text, between, number, units_of_intervals
+from .commands import answer_commands, command_tables, format_commands, shortened
 from .difference import format_changes
 from .limitations import limitations
 from .overview import ControllerOverview, JointOverview, Overview, answer, overview
@@ -26,13 +32,18 @@ __all__ = [
     "Overview",
     "against_model",
     "answer",
+    "answer_commands",
     "answer_in_words",
     "beat_text",
     "beside_note",
     "beside_the_paper",
     "between",
+    "command_tables",
+    "errors_between_engines",
     "families",
+    "format_between_engines",
     "format_changes",
+    "format_commands",
     "format_suite",
     "format_summary",
     "format_tables",
@@ -41,6 +52,8 @@ __all__ = [
     "overview",
     "paper_learner",
     "sampled_scenarios",
+    "shortened",
     "units_of_intervals",
     "verdict",
+    "winners_between_engines",
 ]

@@ -71,6 +71,8 @@ def changes(before: pd.DataFrame, after: pd.DataFrame) -> pd.DataFrame:
 
 def format_changes(first: Results, second: Results) -> str:
     """The changes from a result to another, as text for a terminal."""
+    for results in (first, second):
+        results.check_constant("the comparison of two results")
     before, after = first.summary(), second.summary()
     table = changes(before, after)
     lines = [f"before  {first.folder}", f"after   {second.folder}"]

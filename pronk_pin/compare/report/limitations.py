@@ -31,6 +31,9 @@ _STEADY_APEX = 0.004
 def limitations(results: Results) -> list[str]:
     """Sentences, each about one limitation."""
     summary = results.summary()
+    if results.experiment.commands:
+        about = (_of_the_robot(results), _of_the_driving(results), _of_the_record(results))
+        return [text for sentences in about for text in sentences if text]
     sentences = [
         *_of_the_robot(results),
         *_of_the_sample(results, summary),
@@ -67,6 +70,22 @@ def _of_the_robot(results: Results) -> Iterator[str]:
         "Simulation only. The true world is MuJoCo's, with a compliant ground; its contacts are "
         "not those of a laboratory floor."
     )
+
+
+def _of_the_driving(results: Results) -> Iterator[str]:
+    experiment = results.experiment
+    yield (
+        "Strides of the first two seconds, at most half of a command, do not count. Gaits between "
+        "those of the library obey the equations of motion only nearly."
+    )
+    if any(cell.practice for cell in experiment.cells()):
+        speeds = ", ".join(f"{speed:g}" for speed in experiment.speeds)
+        yield f"What the library holds was learned at {speeds} m/s, and is linear in between."
+    learners = [
+        name for name in experiment.controller_names if any(experiment.controller(name).laws)
+    ]
+    if learners:
+        yield f"{_listed(learners)} learned on all the time, without a guard."
 
 
 def _of_the_sample(results: Results, summary: pd.DataFrame) -> Iterator[str]:

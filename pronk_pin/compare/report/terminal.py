@@ -8,8 +8,9 @@ import textwrap
 import numpy as np
 import pandas as pd
 
-from ..metrics import in_family, of_papers_robot
+from ..metrics import by_command, in_family, of_papers_robot
 from .cells import against_model, beat_text, between, number, units_of_intervals
+from .commands import format_commands
 from .overview import MOVING, Overview, answer
 from .tables import SHOWN, beside_the_paper, paper_learner
 from .verdict import answer_in_words, families
@@ -19,7 +20,9 @@ _WIDTH = 100
 
 def format_summary(summary: pd.DataFrame) -> str:
     """Tables and verdict as text for a terminal: `format_tables` of one scenario, `format_suite` of
-    many."""
+    many, `format_commands` where speeds were commanded."""
+    if by_command(summary):
+        return format_commands(summary)
     worlds = families(list(summary["scenario"].unique()))
     return format_suite(summary) if len(worlds) > 1 else format_tables(summary, scenario=worlds[0])
 

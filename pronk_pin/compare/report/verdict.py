@@ -10,6 +10,7 @@ import pandas as pd
 from ..metrics import (
     CONFIDENCE,
     LEARNER,
+    LEAST_UNITS,
     Interval,
     compare_controllers,
     control_arm,
@@ -137,17 +138,24 @@ def _against_the_model_by_scenario(
 
 
 def _against_the_model(learning: ControllerOverview, model: ControllerOverview) -> str:
-    wins = [joint for joint in SHOWN if learning.joints[joint].better]
-    open_ = [joint for joint in SHOWN if learning.joints[joint].better is None]
-    beats = "beats" if wins else "does not beat"
-    where = f" in the {wins[0]} only" if len(wins) == 1 else ""
-    doubt = f" (in the {' and '.join(open_)} the difference may be chance)" if open_ else ""
+    said = {
+        "beats the model's feedforward": _where(learning, True),
+        "does worse than it": _where(learning, False),
+        "cannot be told from it": _where(learning, None),
+    }
     numbers = ", ".join(
         f"{learning.joints[joint].peak.value:.4f} against {model.joints[joint].peak.value:.4f} rad "
         f"in the {joint}"
         for joint in SHOWN
     )
-    text = f"It {beats} the model's feedforward{where}{doubt}: {numbers}."
+    if not any(learning.joints[joint].difference.known for joint in SHOWN):
+        text = (
+            "Whether it beats the model's feedforward stays open, as an interval of the difference "
+            f"takes {LEAST_UNITS} robots: {numbers}."
+        )
+    else:
+        parts = [what + where for what, where in said.items() if where is not None]
+        text = f"It {' and '.join(parts)}: {numbers}."
     beat = learning.beat
     if beat.robots:
         text += (
@@ -155,6 +163,13 @@ def _against_the_model(learning: ControllerOverview, model: ControllerOverview) 
             f"after {beat.strides:.0f} strides in the median."
         )
     return text
+
+
+def _where(learning: ControllerOverview, better: bool | None) -> str | None:
+    """In which joints practice is better than the model, worse (False), or neither (None)."""
+    found = [joint for joint in SHOWN if learning.joints[joint].better is better]
+    chance = " (the difference may be chance)" if better is None else ""
+    return f" in the {' and '.join(found)}{chance}" if found else None
 
 
 def _with_the_rotors(summary: pd.DataFrame, scenario: str, table: Overview) -> Iterator[str]:

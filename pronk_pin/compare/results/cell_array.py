@@ -16,7 +16,8 @@ from ..._typing import IntArray
 from ..experiment import Cell, Experiment
 
 CELLS = ("controller", "scenario", "seed", "speed")
-"""Dimensions along which the cells lie; those of a quantity itself follow."""
+"""Dimensions along which the cells lie; those of a quantity itself follow. The last is "command"
+where speeds are commanded."""
 
 _CURVES = {"phase", "tick"}
 """What has none of these dimensions takes little memory, and is read at once."""
@@ -101,7 +102,7 @@ class CellArray(xr.backends.BackendArray):
 
 
 def _values(quantity: xr.DataArray) -> npt.NDArray[Any]:
-    return np.asarray(quantity.transpose("speed", ...).to_numpy())
+    return np.asarray(quantity.transpose(*{"speed", "command"}.intersection(quantity.dims), ...))
 
 
 def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> xr.Dataset:
@@ -113,11 +114,12 @@ def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> x
         open: Opens the strides of one of them.
     """
     labels: dict[str, list[Any]] = {
-        "controller": list(dict.fromkeys(cell.controller for cell in experiment.cells())),
+        "controller": list(dict.fromkeys(cell.controller for cell in experiment.compared)),
         "scenario": list(experiment.scenario_names),
         "seed": list(experiment.seeds),
-        "speed": list(experiment.speeds),
     }
+    robots = "command" if experiment.commands else "speed"
+    labels[robots] = list(experiment.commands or experiment.speeds)
     places: dict[Cell, Place] = {}
     sizes: dict[Hashable, int] = {}
     quantities: dict[Hashable, xr.Variable] = {}
@@ -129,7 +131,7 @@ def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> x
             labels["controller"].index(cell.controller),
             labels["scenario"].index(cell.scenario),
             labels["seed"].index(cell.seed),
-            np.array([labels["speed"].index(speed) for speed in cell.speeds]),
+            np.array([labels[robots].index(own) for own in cell.commands or cell.speeds]),
         )
         with open(cell) as file:
             for dim, size in file.sizes.items():
@@ -139,13 +141,13 @@ def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> x
                 if not _CURVES.intersection(map(str, values.dims)):
                     kept.setdefault(name, {})[cell] = _values(values)
             for name, values in file.coords.items():
-                if name != "speed" and values.size == sizes[values.dims[0]]:
+                if name != robots and values.size == sizes[values.dims[0]]:
                     coordinates[name] = values.load().variable
             attributes.append(file.attrs)
     sizes |= {name: len(of) for name, of in labels.items()}
     variables = {}
     for name, quantity in quantities.items():
-        dims = (*CELLS, *(dim for dim in quantity.dims if dim != "speed"))
+        dims = (*CELLS[:-1], robots, *(dim for dim in quantity.dims if dim != robots))
         shape = tuple(sizes[dim] for dim in dims)
         dtype = np.result_type(quantity.dtype, np.float32)  # NaN for counts, too
         array = CellArray(str(name), places, open, kept.get(name), shape, dtype)
@@ -153,6 +155,7 @@ def join_cells(experiment: Experiment, cells: Sequence[Cell], open: Opener) -> x
         cached = indexing.MemoryCachedArray(lazy)  # type: ignore[no-untyped-call]
         variables[name] = xr.Variable(dims, cached, quantity.attrs)
     joined = xr.Dataset(variables, {**coordinates, **labels})
-    joined["speed"].attrs["units"] = "m/s"
+    if not experiment.commands:
+        joined["speed"].attrs["units"] = "m/s"
     found = {name: {each[name] for each in attributes if name in each} for name in _COMMON}
     return joined.assign_attrs({name: of.pop() for name, of in found.items() if len(of) == 1})

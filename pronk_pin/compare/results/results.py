@@ -141,7 +141,7 @@ class Results(Displayed):
         """
         times: dict[str, list[float]] = {}
         made = {name: one for run in self.provenance["runs"] for name, one in run["cells"].items()}
-        for cell in self.experiment.cells():
+        for cell in self.experiment.compared:
             if "control_us_per_tick" in made.get(cell.name, {}):
                 found = float(made[cell.name]["control_us_per_tick"])
                 times.setdefault(cell.controller, []).append(found)
@@ -179,10 +179,10 @@ class Results(Displayed):
             InvalidInput: The result does not have them.
         """
         scenario = scenario or self.experiment.scenario_names[0]
-        for cell in self.experiment.cells():
+        for cell in self.experiment.compared:
             if (cell.controller, cell.scenario) == (controller, scenario):
                 return cell
-        known = ", ".join(sorted({cell.controller for cell in self.experiment.cells()}))
+        known = ", ".join(sorted({cell.controller for cell in self.experiment.compared}))
         raise InvalidInput(
             f"no '{controller}' in scenario '{scenario}'; the result has the controllers {known} "
             f"in the scenarios {', '.join(self.experiment.scenario_names)}"
@@ -235,17 +235,30 @@ class Results(Displayed):
         first = self.find(controller=controller, scenario=scenario)
         cells = [
             cell
-            for cell in self.experiment.cells()
+            for cell in self.experiment.compared
             if (cell.controller, cell.scenario, cell.seed)
             == (first.controller, first.scenario, first.seed)
         ]
         return join_speeds([self.strides(cell) for cell in cells])
 
+    def check_constant(self, what: str) -> None:
+        """Refuse a result of commanded speeds for something that needs constant ones.
+
+        Raises:
+            InvalidInput: It is one.
+        """
+        if self.experiment.commands:
+            raise InvalidInput(
+                f"{what} needs strides at constant speeds, and {self.folder} is of commanded ones; "
+                "choose a result without --command"
+            )
+
     def dataset(self) -> xr.Dataset:
         """The strides of all cells as one dataset: `dataset()["peak_error"].sel(controller="ilc")`.
 
-        Dimensions: `controller`, `scenario`, `seed` and `speed`, by name and value and in the
-        experiment's order, then those of the quantity, as `strides` has them, with their units.
+        Dimensions: `controller`, `scenario`, `seed` and `speed`, or `command` where speeds were
+        commanded, by name and value and in the experiment's order, then those of the quantity, as
+        `strides` has them, with their units.
         What there is not is NaN: strides and ticks after the end of a shorter simulation, and cells
         that are not there yet. Speeds that were added later lie among the others.
 
@@ -258,7 +271,7 @@ class Results(Displayed):
             FileProblem: No strides are there yet, or a file is damaged or of another simulation.
         """
         manifest = self.manifest
-        cells = [c for c in self.experiment.cells() if manifest.holds(_strides_name(c))]
+        cells = [c for c in self.experiment.compared if manifest.holds(_strides_name(c))]
         if not cells:
             raise FileProblem(self.folder, "has no strides yet", complete(self.folder))
         return join_cells(self.experiment, cells, self._open)
@@ -302,7 +315,7 @@ class Results(Displayed):
             return kept.copy()
         summary = read_summary(self.manifest, made_of=self._summary_source)
         if summary is None:
-            cells = self.experiment.cells()
+            cells = self.experiment.compared
             summary = join_summaries(
                 summarize_cell(self.strides(cell), self.experiment.own_metrics) for cell in cells
             )
@@ -320,6 +333,10 @@ class Results(Displayed):
         self._keep(summary)
 
     def _keep(self, summary: pd.DataFrame) -> pd.DataFrame:
+        """Keep a summary, with its scenarios in the order of the experiment, as figures have it."""
+        place = {name: k for k, name in enumerate(self.experiment.scenario_names)}
+        order = summary["scenario"].map(place).argsort(kind="stable")
+        summary = summary.iloc[order].reset_index(drop=True)
         self._summaries.clear()
         self._summaries[self._digests] = summary
         return summary.copy()

@@ -8,7 +8,7 @@ import pandas as pd
 
 from ...errors import FileProblem
 from ...storage import reading
-from ..metrics import COLUMNS
+from ..metrics import COLUMNS, COMMAND_COLUMNS
 from .manifest import Manifest
 
 SUMMARY = "summary.csv"
@@ -45,7 +45,8 @@ def read_summary(manifest: Manifest, *, made_of: str) -> pd.DataFrame | None:
         with reading(SUMMARY, ""):
             # As text at first: the reader's own conversion may miss the last bit.
             summary = pd.read_csv(io.BytesIO(data), dtype=dict.fromkeys(_NUMBERS, str))
-            summary = summary.astype(dict.fromkeys(_NUMBERS, float))
+            numbers = [name for name in _NUMBERS if name in summary]
+            summary = summary.astype(dict.fromkeys(numbers, float))
     except FileProblem:
         return None
-    return summary if list(summary.columns) == COLUMNS else None
+    return summary if list(summary.columns) in (COLUMNS, COMMAND_COLUMNS) else None

@@ -6,11 +6,12 @@ Goes out: a log of strides and ticks, and its labelled dataset.
 
 from .dataset import to_dataset
 from .memory import SHORTER, check_memory, number_of_robots
-from .schedule import Schedule
+from .schedule import SHORTEST, Schedule
 from .simulation import Progress, Simulation, simulate
 
 __all__ = [
     "SHORTER",
+    "SHORTEST",
     "Progress",
     "Schedule",
     "Simulation",

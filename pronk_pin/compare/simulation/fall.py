@@ -13,11 +13,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..._typing import Array, BoolArray, IntArray
+from ..._typing import BoolArray, IntArray
 from ...control import phase_grid
 from ...gait import Gait
 from ...robot import rotation_matrix
-from ..world import Motion, finite
+from ..world import Motion
 
 LEAST_HEIGHT = 0.6
 """Trunk height, over that of the gait's lowest point, below which a robot has fallen."""
@@ -47,8 +47,3 @@ class FallDetector:
         if motion.pose is not None:
             fallen |= rotation_matrix(motion.pose[..., 3:])[..., 2, 2] < self._upright
         return np.asarray(fallen)
-
-    @staticmethod
-    def broken(states: Array) -> BoolArray:
-        """Whether physics states (..., nstate) are not finite; what is not finite stays so."""
-        return ~finite(states)

@@ -23,7 +23,15 @@ from ...gait import Gait
 from ...robot import Robot, rotation_matrix
 from ..world import Motion
 from .contact_errors import ContactErrors
-from .quantities import EVERY, LAST, SAMPLES, STRIDE_QUANTITIES, TICK_QUANTITIES, sizes_of
+from .quantities import (
+    COMMAND_QUANTITIES,
+    EVERY,
+    LAST,
+    SAMPLES,
+    STRIDE_QUANTITIES,
+    TICK_QUANTITIES,
+    sizes_of,
+)
 
 SHORTEST_STRIDE = 0.5
 """Strides shorter than this share of the planned duration do not occur: it sizes the log."""
@@ -153,8 +161,8 @@ class StrideLog:
     """The strides of n robots, numbered from 0; a stride goes from touchdown to touchdown.
 
     Its arrays are those of `STRIDE_QUANTITIES`, `log["peak_error"]` for instance, whose first axes
-    are n robots and strides, NaN where a stride has not come so far; and those of
-    `TICK_QUANTITIES`, see `ticks`.
+    are n robots and strides, NaN where a stride has not come so far; those of `COMMAND_QUANTITIES`,
+    NaN where no speed is commanded; and those of `TICK_QUANTITIES`, see `ticks`.
 
     Args:
         gaits: The gait of each robot.
@@ -164,8 +172,6 @@ class StrideLog:
 
     Attributes:
         count: Strides that each robot has finished, shape (n,).
-        commanded: Commanded speed at the beginning of each stride [m/s], and
-        gait_speed: speed of its gait [m/s], where they change, shape (n, strides); NaN elsewhere.
     """
 
     def __init__(
@@ -190,21 +196,28 @@ class StrideLog:
         self._near = (LAST + 1) * LONGEST_PART * whole
         self._close = np.zeros(n, dtype=bool)
         self._strides = int(np.ceil(duration / (SHORTEST_STRIDE * shortest))) + 1
-        self.commanded, self.gait_speed = np.full((2, n, self._strides), np.nan)
         longest = max(getattr(gait, part).duration for gait in (*gaits, *others) for part in PARTS)
         ticks = int(np.ceil(LONGEST_PART * longest / timestep))
         sizes = {"speed": n, "stride": self._strides, "tick": ticks, **sizes_of(gaits[0])}
-        self._arrays = {each.name: each.empty(sizes) for each in STRIDE_QUANTITIES}
+        self._arrays = {
+            each.name: each.empty(sizes) for each in (*STRIDE_QUANTITIES, *COMMAND_QUANTITIES)
+        }
         self._ticks = {each.name: each.empty(sizes) for each in TICK_QUANTITIES}
 
     def __getitem__(self, name: str) -> npt.NDArray[np.floating[Any]]:
         """The array of a quantity of the strides."""
         return self._arrays[name]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the quantities of the strides."""
+        return tuple(self._arrays)
+
     def change(self, rows: IntArray, gaits: Sequence[Gait], commanded: Array) -> None:
         """Take other gaits for robots from the stride on that begins, at commanded speeds (m,)."""
         at = rows, self.count[rows]
-        self.commanded[at], self.gait_speed[at] = commanded, [gait.speed for gait in gaits]
+        self["commanded"][at] = commanded
+        self["gait_speed"][at] = [gait.speed for gait in gaits]
         for part, name in enumerate(PARTS):
             self._planned[part, rows] = [getattr(gait, name).duration for gait in gaits]
         self._contact.change(rows, gaits)

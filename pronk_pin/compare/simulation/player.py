@@ -18,7 +18,7 @@ from ...control import (
 )
 from ...gait import Gait
 from ...robot import Robot
-from ..world import Motion, Motors, Scenario, SensorSuite, World, level_specific_force
+from ..world import Motion, Motors, Scenario, SensorSuite, engine_of, level_specific_force
 from .fall import FallDetector
 from .log import TickLog
 from .playback import (
@@ -48,7 +48,7 @@ class Player:
         chunked: Play many ticks at once where that is possible; the motion is the same.
 
     Attributes:
-        world: The robots in MuJoCo.
+        world: The robots in the scenario's engine.
         motors, sensors: Theirs.
         log: The phase that they are in, as it truly is.
         sensed: The same as the robots know it: the log itself, where nothing is noisy.
@@ -76,7 +76,9 @@ class Player:
         known &= tick_loop is None
         gains = spec.gains_of(robot)
         servo = gains if known and scenario.affine else None
-        self.world = World(robot, scenario, n, base=base, servo=servo)
+        engine = engine_of(scenario)
+        engine.check(robot, scenario, base)
+        self.world = engine.world(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
         dt = scenario.timestep
         self.sensors = SensorSuite(
@@ -144,7 +146,7 @@ class Player:
             count = np.minimum(played[going], stop) - tick
             self.world.advance(who, motion, count)
             playback.advanced(segment, motion, count)
-            self._restart_broken(who)
+            self._restart_broken(who[~motion.finite[np.arange(len(who)), count - 1]])
             going, tick = going[played[going] > stop], stop
         if airborne:
             self.late[rows] = self._touchdown.lateness(
@@ -170,8 +172,8 @@ class Player:
         over, ends = count == length[:, None], np.full(len(rows), count[-1] + 1)
         if airborne:
             over |= self._felt(rows, count)
-        if self.falls.broken(motion.path[:, -1]).any():
-            over |= self.falls.broken(motion.path[:, 1:])
+        if not motion.finite[:, -1].all():  # what is not finite stays so
+            over |= ~motion.finite
         ended = over.any(axis=1)
         ends[ended] = count[np.argmax(over[ended], axis=1)]
         fallen = self.falls.fallen(rows, motion) & (count <= ends[:, None])
@@ -189,12 +191,11 @@ class Player:
 
     def _restart_broken(self, rows: IntArray) -> None:
         """Reset robots with states that are not finite to rest; they have fallen."""
-        broken = rows[self.falls.broken(self.world.state[rows])]
-        if broken.size:
-            self.world.restart(broken)
+        if rows.size:
+            self.world.restart(rows)
             if self._tick_loop is not None:
-                self._tick_loop.restart(broken)
-            self.upright[broken] = False
+                self._tick_loop.restart(rows)
+            self.upright[rows] = False
 
     def measured(self, rows: IntArray, length: IntArray, *, sensed: int = 0) -> PhaseLog:
         """Log of the robots' measurements in a part of the stride of so many ticks (m,)."""

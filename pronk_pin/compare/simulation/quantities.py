@@ -135,6 +135,15 @@ STRIDE_QUANTITIES = (
 )
 """Quantities of every stride."""
 
+COMMAND_QUANTITIES = (
+    Quantity("commanded", _STRIDE, "m/s", "commanded speed at the beginning of the stride"),
+    Quantity("gait_speed", _STRIDE, "m/s", "speed of the gait of the stance"),
+    Quantity(
+        "landing_speed", _STRIDE, "m/s", "speed of the gait of the flight, which is landed in"
+    ),
+)
+"""Quantities of every stride of robots whose speed is commanded."""
+
 TICK_QUANTITIES = (
     Quantity("tick_joints", (*_TICK, "joint"), "rad", "measured joint angle at each tick"),
     Quantity(

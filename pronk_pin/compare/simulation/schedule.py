@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..._checks import Interval, keep_reals
 from ...errors import InvalidInput
 
-_SHORTEST = 1.0
+SHORTEST = 1.0
 """Shortest baseline and learning together [s]: even a robot on the ground finishes a stride."""
 
 _LIMITS = {
@@ -36,10 +36,10 @@ class Schedule:
 
     def __post_init__(self) -> None:
         keep_reals(self, _LIMITS, "schedule: ")
-        if self.baseline + self.learning < _SHORTEST:
+        if self.baseline + self.learning < SHORTEST:
             raise InvalidInput(
                 f"baseline and learning of {self.baseline:g} + {self.learning:g} s are too short "
-                f"for a stride; make them {_SHORTEST:g} s or more together"
+                f"for a stride; make them {SHORTEST:g} s or more together"
             )
 
     @property

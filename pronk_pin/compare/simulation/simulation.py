@@ -25,7 +25,7 @@ from ...control import (
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
 from ...robot import BASES, Robot
-from ..world import Scenario, without_warnings
+from ..world import Scenario
 from .dataset import to_dataset
 from .log import StrideLog
 from .memory import check_memory
@@ -163,7 +163,7 @@ class Simulation:
                     self._stride(going[late == ticks], steps=steps, late=int(ticks))
                 report()
 
-        with without_warnings(), ThreadPoolExecutor(self._threads) as pool:
+        with self.world.running(), ThreadPoolExecutor(self._threads) as pool:
             self._startup()
             shares = np.array_split(np.arange(len(self._gaits)), self._threads)
             side_by_side = pool.map if self._threads > 1 else map
@@ -212,6 +212,8 @@ class Simulation:
             tape, record = controller.liftoff(
                 rows, measured_log, self._commanded(rows, start + stance)
             )
+        if self._command is not None:
+            strides["landing_speed"][rows, strides.count[rows]] = self._command.speed[rows]
         if player.sensed is not log:  # what is kept is the truth
             record = controller.record(0, rows, log.phase(rows, stance, sensed=late))
         strides.stance(rows, record, log, stance)
@@ -265,6 +267,7 @@ def simulate(
     attributes: Mapping[str, str | int | float] | None = None,
     progress: Progress | None = None,
     control_time: ControlTime | None = None,
+    command: SpeedCommand | None = None,
 ) -> xr.Dataset:
     """Simulate robots under one controller in one scenario, and label their strides.
 
@@ -280,6 +283,7 @@ def simulate(
         attributes: Attributes of the dataset; by default the name of the robot.
         progress: Called with the number of time steps done since the last call.
         control_time: Takes how long the controller computed.
+        command: Commanded speeds, see `Simulation`.
 
     Returns:
         The strides, see `to_dataset`.
@@ -295,9 +299,10 @@ def simulate(
         feedforward=initial.feedforward,
         flight=initial.flight,
         base=base,
+        command=command,
     )
     attributes = {"robot": robot.name} if attributes is None else attributes
     log = simulation.run(progress)
     if control_time is not None:
         control_time.add(simulation.control_time)
-    return to_dataset(log, robot, gaits, attributes=attributes)
+    return to_dataset(log, robot, gaits, attributes=attributes, command=command)

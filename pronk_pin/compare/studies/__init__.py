@@ -7,16 +7,18 @@ loop closed with an identified model.
 
 from .driving import (
     DRIVERS,
+    PUSHED,
     RAMPS,
     SWEEPS,
-    describe_driving,
+    Driving,
     describe_wandering,
     measure_driving,
     measure_wandering,
-    summarize_driving,
 )
+from .engine_transfer import describe_engine_transfer, measure_engine_transfer
 from .gain_reduction import describe_gains, sweep_gains
 from .identified_models import close_loop, format_loop
+from .learning_runs import machine_and_gaits
 from .prediction import (
     STRIDES,
     Prediction,
@@ -33,14 +35,16 @@ from .transfer import TOLERANCE, describe_transfers, measure_transfers
 __all__ = [
     "COUPLINGS",
     "DRIVERS",
+    "PUSHED",
     "RAMPS",
     "STRIDES",
     "SWEEPS",
     "TOLERANCE",
+    "Driving",
     "Prediction",
     "close_loop",
     "compare_prediction",
-    "describe_driving",
+    "describe_engine_transfer",
     "describe_gains",
     "describe_prediction",
     "describe_seeding",
@@ -49,7 +53,9 @@ __all__ = [
     "describe_wandering",
     "format_loop",
     "format_reproduction",
+    "machine_and_gaits",
     "measure_driving",
+    "measure_engine_transfer",
     "measure_seeding",
     "measure_stability",
     "measure_transfers",
@@ -57,6 +63,5 @@ __all__ = [
     "simulate_learning",
     "stayed_up",
     "stored_learning",
-    "summarize_driving",
     "sweep_gains",
 ]

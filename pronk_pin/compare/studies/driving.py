@@ -5,27 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from ..._typing import Array
-from ...control import (
-    ControllerSpec,
-    InitialFeedforward,
-    SpeedCommand,
-    SpeedProfile,
-    TorqueLibrary,
-    load_controller,
-    model_feedforward,
-)
+from ...control import InitialFeedforward, SpeedCommand, SpeedProfile, load_controller
 from ...errors import InvalidInput
-from ...gait import GaitLibrary, load_library
-from ...robot import JOINTS, Robot, load_robot
-from ..experiment import torque_library
+from ...gait import GaitLibrary
+from ...robot import RobotSpec
+from ..experiment import Experiment, run_cell, torque_library
+from ..metrics import stride_table, summarize_commands
 from ..simulation import Progress, Schedule, Simulation, simulate
 from ..world import Scenario
-from .learning_runs import COMPARED, learn, mean_peaks
+from .learning_runs import COMPARED, LONG, learn, machine_and_gaits, mean_peaks
 
 RAMPS = (
     *("0 4s, 0->0.8 8s, 0.8 4s, 0.8->0 8s, 0 4s", "0 4s, 0->0.8 2s, 0.8 4s, 0.8->0 2s, 0 4s"),
@@ -42,8 +35,22 @@ SWEEPS = "0 4s, 0->0.8 8s, 0.8->-0.5 13s, -0.5->0.8 13s, 0.8->-0.5 13s, -0.5->0 
 
 _REPLAY = Schedule(0.5, 8.0, 0.0)
 
-_SETTLED = 2.0
-"""Time after which the start is over [s]."""
+PUSHED = ("0 12s", "0.4 12s", "0.8 12s")
+"""Constant speeds, at which a push is told best."""
+
+_NEAR = 0.05
+"""Difference to the command [m/s] within which a robot has settled."""
+
+
+class Driving(NamedTuple):
+    """What robots did that were driven by commands."""
+
+    strides: pd.DataFrame
+    """The strides of all controllers, see `compare.metrics.stride_table`."""
+    summary: pd.DataFrame
+    """The summary, see `compare.metrics.summarize_commands`, with `strides_to_settle`: until the
+    mean speed stays within 0.05 m/s of the command, after the push, or the command's last change;
+    NaN where it does not."""
 
 
 def measure_driving(
@@ -51,170 +58,105 @@ def measure_driving(
     scenario: Scenario,
     *,
     controllers: Sequence[str] = DRIVERS,
-    robot: str = "a1",
-    reference: str = "commanded",
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
+    references: Sequence[str] = ("commanded",),
+    push: float = 0.0,
     progress: Progress | None = None,
-) -> pd.DataFrame:
+) -> Driving:
     """Learn at the shipped speeds that the commands span, then drive by them.
 
-    Each controller drives one robot a command, side by side. Those that learn have no guard, whose
-    memory is of one speed.
+    This is an `Experiment` with commands, with a longer learning beforehand, in which nobody is
+    pushed.
 
     Args:
         commands: Speed profiles, see `SpeedProfile.parse`.
         scenario: The scenario, of the learning and of the driving.
-        controllers: Names of controllers with tapes: those of source "library" play what was
-            learned.
-        robot: Short name of the robot.
-        reference: By which speed gaits are chosen, see `SpeedCommand`.
+        controllers: Names of controllers.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
+        references: By which speeds gaits are chosen, see `SpeedCommand`; controllers are named with
+            theirs if there are several.
+        push: Impulse of a push forward, once, after three fifths of the longest command [N s].
         progress: Called with the number of time steps done since the last call.
-
-    Returns:
-        A row for each controller, command and stride: `controller`, `command`, `time` of touchdown
-        [s], `commanded`, `gait_speed` and mean `speed` of the trunk [m/s], peak stance errors
-        `thigh` and `calf` from the true contact on, means over the legs [rad], and whether the
-        robot is `upright`.
 
     Raises:
         InvalidInput: A command is no speed profile, or a controller cannot follow one.
         SpeedOutOfRange: A command is beyond the robot's gaits.
     """
-    profiles = [SpeedProfile.parse(command) for command in commands]
-    if not profiles:
+    if not commands:
         raise InvalidInput("no commands; give one or more, as '0 4s, 0->0.8 2s, 0.8 4s'")
-    machine, library = load_robot(robot), load_library(robot)
-    specs = [replace(load_controller(name), guard=None) for name in controllers]
-    torques = _torques(specs, machine, library, profiles, scenario)
-    longest = max(profile.duration for profile in profiles)
-    tables = []
-    for spec in specs:
-        command = SpeedCommand(
-            profiles, library, torque=torques.get(spec.source), reference=reference
-        )
-        initial = command.initial_feedforward
-        simulation = Simulation(
-            machine,
-            command.first_gaits,
-            spec,
-            scenario,
-            schedule=Schedule(0.5, 0.0, longest),
-            rng=np.random.default_rng(0),
-            feedforward=initial.feedforward,
-            flight=initial.flight,
-            command=command,
-        )
-        simulation.run(progress)
-        for k, profile in enumerate(profiles):
-            tables.append(_strides(spec, simulation, k, profile))
-    return pd.concat(tables, ignore_index=True)
-
-
-def _torques(
-    specs: Sequence[ControllerSpec],
-    robot: Robot,
-    library: GaitLibrary,
-    profiles: Sequence[SpeedProfile],
-    scenario: Scenario,
-) -> dict[str, TorqueLibrary]:
-    """Feedforward by speed, of each source that is needed."""
-    asked = [speed for profile in profiles for speed in profile.speeds]
-    speeds = library.speeds
-    first = max(int(np.searchsorted(speeds, min(asked), side="right")) - 1, 0)
-    last = min(int(np.searchsorted(speeds, max(asked))), len(speeds) - 1)
-    gaits = [library.at(float(speed)) for speed in speeds[first : last + 1]]
-    sources, torques = {spec.source for spec in specs}, {}
-    if "library" in sources:
-        torques["library"] = torque_library(learn(robot, gaits, load_controller("ilc"), scenario))
-    if "model" in sources:
-        torque = model_feedforward(robot, gaits)
-        torques["model"] = TorqueLibrary(
-            np.array([gait.speed for gait in gaits]),
-            torque,
-            np.zeros_like(torque),
-            np.array([gait.flight.duration for gait in gaits]),
-        )
-    if "identified" in sources:
-        raise InvalidInput(
-            "what is identified is of one speed at a time; choose controllers of the sources "
-            "none, model and library"
-        )
-    return torques
-
-
-def _strides(
-    spec: ControllerSpec, simulation: Simulation, robot: int, profile: SpeedProfile
-) -> pd.DataFrame:
-    """The strides of one robot, as far as its command goes."""
-    log = simulation.strides
-    count = int(log.count[robot])
-    peaks = log["peak_error"][robot, :count].reshape(count, -1, len(JOINTS)).mean(axis=1)
-    table = pd.DataFrame(
-        {
-            "controller": spec.name,
-            "command": str(profile),
-            "time": log["start"][robot, :count],
-            "commanded": log.commanded[robot, :count],
-            "gait_speed": log.gait_speed[robot, :count],
-            "speed": log["mean_speed"][robot, :count],
-            **{joint: peaks[:, JOINTS.index(joint)] for joint in COMPARED},
-            "upright": log["upright"][robot, :count] == 1.0,
-        }
+    experiment = Experiment(
+        robot=robot,
+        gaits=gaits,
+        controllers=tuple(controllers),
+        scenarios=(scenario,),
+        schedule=LONG,
+        commands=tuple(commands),
     )
-    return table[table["time"] < profile.duration]
-
-
-def summarize_driving(table: pd.DataFrame) -> pd.DataFrame:
-    """What `measure_driving` found, by command and controller.
-
-    Returns:
-        Rows by `command` and `controller`: worst and mean peaks, `worst_calf`, `mean_calf` and the
-        like [rad], root mean square of the mean speed's difference to the commanded one
-        `speed_error` [m/s], and `upright`. The first two seconds do not count.
-    """
-    rows = []
-    for (command, controller), strides in table.groupby(["command", "controller"], sort=False):
-        late = strides[strides["time"] >= _SETTLED]
-        rows.append(
-            {
-                "command": command,
-                "controller": controller,
-                **{f"worst_{joint}": late[joint].max() for joint in COMPARED},
-                **{f"mean_{joint}": late[joint].mean() for joint in COMPARED},
-                "speed_error": _rms((late["speed"] - late["commanded"]).to_numpy()),
-                "upright": bool(strides["upright"].all()),
-            }
+    practised = [run_cell(cell, None, progress) for cell in experiment.cells() if cell.practice]
+    longest = max(profile.duration for profile in experiment.profiles)
+    pushed_after = LONG.startup + 0.6 * longest if push else np.nan
+    if push:  # only once: a second one would come after the end
+        scenario = replace(
+            scenario,
+            name=f"{scenario.name}-pushed",
+            push_impulse=(push, 0.0, 0.0),
+            push_period=pushed_after,
         )
-    return pd.DataFrame(rows)
+    tables, summaries = [], []
+    for reference in references:
+        driven = replace(experiment, reference=reference, scenarios=(scenario,))
+        for cell in driven.compared:
+            needed = practised[0] if cell.depends_on is not None else None
+            strides = run_cell(cell, needed, progress)
+            if len(references) > 1:
+                strides.attrs["controller"] = f"{cell.controller}, {reference}"
+            tables.append(stride_table(strides))
+            summaries += [summarize_commands(strides)]
+            summaries += [_settling(summaries[-1], tables[-1], pushed_after - LONG.startup)]
+    return Driving(pd.concat(tables, ignore_index=True), pd.concat(summaries, ignore_index=True))
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def describe_driving(table: pd.DataFrame) -> str:
-    """The table of `measure_driving` as text."""
-    lines = [
-        "peaks of stance errors from the true contact on, worst and mean of all strides [mrad];",
-        "speed: root mean square of what the trunk's mean speed lacks of the command [m/s]",
+def _settling(summary: pd.DataFrame, table: pd.DataFrame, pushed: float) -> pd.DataFrame:
+    """Rows `strides_to_settle` of a summary."""
+    rows = summary[summary["metric"] == "upright"].copy()
+    rows["metric"] = "strides_to_settle"
+    rows["value"] = [
+        _strides_to_settle(
+            table[table["command"] == command],
+            _last_change(SpeedProfile.parse(command)) if np.isnan(pushed) else pushed,
+        )
+        for command in rows["command"]
     ]
-    for command, rows in summarize_driving(table).groupby("command", sort=False):
-        lines += ["", str(command)]
-        lines.append(f"{'controller':<14}{'calf':>14}{'thigh':>14}{'speed':>8}")
-        for row in rows.itertuples():
-            calf, thigh = (
-                f"{1e3 * worst:.1f}, {1e3 * mean:.1f}"
-                for worst, mean in (
-                    (row.worst_calf, row.mean_calf),
-                    (row.worst_thigh, row.mean_thigh),
-                )
-            )
-            fell = "" if row.upright else "  fell"
-            lines.append(f"{row.controller:<14}{calf:>14}{thigh:>14}{row.speed_error:>8.3f}{fell}")
-    return "\n".join(lines)
+    return rows
+
+
+def _last_change(profile: SpeedProfile) -> float:
+    """Time from which on a command stays as it is [s]."""
+    changing = np.flatnonzero(np.array(profile.speeds) != profile.speeds[-1])
+    return profile.times[changing[-1] + 1] if changing.size else 0.0
+
+
+def _strides_to_settle(strides: pd.DataFrame, since: float) -> float:
+    """Strides that begin after a time until the speed stays near the command; NaN if it does not.
+
+    A stride in which something changes is the first.
+    """
+    after = strides[strides["time"] >= since - strides["time"].diff().median()]
+    away = np.flatnonzero((after["speed"] - after["commanded"]).abs() > _NEAR)
+    if not len(after) or (len(away) and away[-1] + 1 == len(after)):
+        return float("nan")
+    return float(away[-1] + 1) if len(away) else 0.0
 
 
 def measure_wandering(
-    command: str, scenario: Scenario, *, robot: str = "a1", reference: str = "commanded"
+    command: str,
+    scenario: Scenario,
+    *,
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
+    reference: str = "commanded",
 ) -> pd.DataFrame:
     """Learn from nothing while the speed changes, then replay at each speed what was learned.
 
@@ -223,7 +165,8 @@ def measure_wandering(
     Args:
         command: Speed profile of the learning, see `SpeedProfile.parse`.
         scenario: The scenario.
-        robot: Short name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
         reference: By which speed gaits are chosen, see `SpeedCommand`.
 
     Returns:
@@ -231,7 +174,8 @@ def measure_wandering(
         contact on in calf and thigh, `none_calf`, `practised_calf`, `driven_calf` and the like
         [rad]; NaN where a robot fell.
     """
-    profile, machine, library = SpeedProfile.parse(command), load_robot(robot), load_library(robot)
+    profile = SpeedProfile.parse(command)
+    machine, library = machine_and_gaits(robot, gaits)
     learner, replay = replace(load_controller("ilc"), guard=None), load_controller("library")
     following = SpeedCommand([profile], library, reference=reference)
     Simulation(
@@ -243,10 +187,10 @@ def measure_wandering(
         rng=np.random.default_rng(0),
         command=following,
     ).run()
-    gaits = [library.at(float(speed)) for speed in library.speeds]
-    planned = np.array([gait.flight.duration for gait in gaits])
+    played = [library.at(float(speed)) for speed in library.speeds]
+    planned = np.array([gait.flight.duration for gait in played])
     memory = following.memory
-    practised = torque_library(learn(machine, gaits, load_controller("ilc"), scenario))
+    practised = torque_library(learn(machine, played, load_controller("ilc"), scenario))
     skills = {
         "none": InitialFeedforward(),
         "practised": InitialFeedforward(practised.torque, practised.flight),
@@ -256,14 +200,14 @@ def measure_wandering(
     for name, skill in skills.items():
         strides = simulate(
             machine,
-            gaits,
+            played,
             replay,
             scenario,
             schedule=_REPLAY,
             rng=np.random.default_rng(0),
             initial=skill,
         )
-        peaks = [mean_peaks(strides, k) for k in range(len(gaits))]
+        peaks = [mean_peaks(strides, k) for k in range(len(played))]
         for joint in COMPARED:
             table[f"{name}_{joint}"] = [float(peak[joint]) for peak in peaks]
     return pd.DataFrame(table)

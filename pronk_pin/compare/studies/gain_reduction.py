@@ -11,12 +11,12 @@ import pandas as pd
 from ..._checks import Interval, reals
 from ...control import ControllerSpec, Gains, InitialFeedforward
 from ...errors import InvalidInput
-from ...gait import load_library
-from ...robot import load_robot
+from ...gait import GaitLibrary
+from ...robot import RobotSpec
 from ..report import number
 from ..simulation import Schedule, Simulation, simulate
 from ..world import Scenario
-from .learning_runs import learning_law, mean_peaks
+from .learning_runs import learning_law, machine_and_gaits, mean_peaks
 
 SHARES = (1.0, 0.75, 0.5, 0.35, 0.25)
 """Feedback gains of the sweep, over the controller's own."""
@@ -28,7 +28,8 @@ def sweep_gains(
     speeds: Sequence[float],
     scenario: Scenario,
     *,
-    robot: str = "a1",
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
     shares: Sequence[float] = SHARES,
 ) -> pd.DataFrame:
     """Learn once with full gains, then replay the learned feedforward with smaller ones.
@@ -37,7 +38,8 @@ def sweep_gains(
         spec: A controller that learns.
         speeds: Desired speeds [m/s].
         scenario: The scenario.
-        robot: Short name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
         shares: Feedback gains, over the controller's own.
 
     Returns:
@@ -49,10 +51,10 @@ def sweep_gains(
     speeds, shares = reals("speeds", speeds), reals("shares", shares, Interval(0, 1))
     if not speeds or not shares:
         raise InvalidInput("no speeds or no shares; give at least one of each")
-    machine, library = load_robot(robot), load_library(robot)
-    gaits = [library.at(speed) for speed in speeds]
+    machine, library = machine_and_gaits(robot, gaits)
+    played = [library.at(speed) for speed in speeds]
     rng = np.random.default_rng(0)
-    learning = Simulation(machine, gaits, spec, scenario, schedule=_LEARNING, rng=rng)
+    learning = Simulation(machine, played, spec, scenario, schedule=_LEARNING, rng=rng)
     learning.run()
     learned = InitialFeedforward(learning.controller.feedforward, learning.controller.flight)
     rows = []
@@ -65,7 +67,7 @@ def sweep_gains(
                 replay = replace(replay, timing=None)  # learning finds that out, too
             replayed = simulate(
                 machine,
-                gaits,
+                played,
                 replay,
                 scenario,
                 schedule=_REPLAY,

@@ -5,22 +5,37 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from ..._checks import reals
 from ...control import ControllerSpec, LearningLaw
 from ...errors import InvalidInput
-from ...gait import Gait
-from ...robot import JOINTS, Robot
+from ...gait import Gait, GaitLibrary
+from ...robot import JOINTS, Robot, RobotSpec
+from ..experiment import Experiment
 from ..metrics import STEADY_STRIDES
-from ..simulation import Schedule, simulate
+from ..simulation import Progress, Schedule, simulate
 from ..world import Scenario
 
 COMPARED = ("thigh", "calf")
 """Joints whose errors are compared."""
 
 # At 0.8 m/s it takes 20 s until the touchdown stays at one tick.
-_LONG = Schedule(0.5, 4.0, 28.0)
+LONG = Schedule(0.5, 4.0, 28.0)
+"""Baseline and learning until the touchdowns have settled."""
+
+
+def machine_and_gaits(
+    robot: str | RobotSpec, gaits: str | GaitLibrary
+) -> tuple[Robot, GaitLibrary]:
+    """A robot and its gaits, each given as an `Experiment` takes it.
+
+    Raises:
+        PronkError: What `Experiment` raises.
+    """
+    experiment = Experiment(robot=robot, gaits=gaits, controllers=("pd",))
+    return experiment.model, experiment.library
 
 
 def learning_law(spec: ControllerSpec) -> LearningLaw:
@@ -51,11 +66,45 @@ def speeds_with_neighbours(study: str, speeds: Sequence[float]) -> tuple[float, 
 
 
 def learn(
-    robot: Robot, gaits: Sequence[Gait], spec: ControllerSpec, scenario: Scenario
+    robot: Robot,
+    gaits: Sequence[Gait],
+    spec: ControllerSpec,
+    scenario: Scenario,
+    *,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Learn until the touchdowns have settled; the strides, of which a torque library is made."""
     rng = np.random.default_rng(0)
-    return simulate(robot, gaits, spec, scenario, schedule=_LONG, rng=rng)
+    return simulate(robot, gaits, spec, scenario, schedule=LONG, rng=rng, progress=progress)
+
+
+def peaks_by_stride(strides: xr.Dataset) -> pd.DataFrame:
+    """Peaks of each robot from the last stride before the learning on, as many of each.
+
+    Returns:
+        A row for each speed and stride: `speed` [m/s], `stride` (of learning; 0 is the last before
+        it), peak stance errors `thigh` and `calf` from the true contact on, means over the legs
+        [rad], and whether the robot is `upright`.
+    """
+    learning, peak, upright = (
+        strides[name].to_numpy() for name in ("learning", "peak_error", "upright")
+    )
+    first, tables = np.argmax(learning == 1, axis=1), []
+    length = int((strides["count"].to_numpy() - first).min()) + 1
+    for k, speed in enumerate(strides["speed"].to_numpy()):
+        window = slice(first[k] - 1, first[k] - 1 + length)
+        legs = peak[k, window].reshape(length, -1, len(JOINTS)).mean(axis=1)  # (length, 3)
+        tables.append(
+            pd.DataFrame(
+                {
+                    "speed": speed,
+                    "stride": np.arange(length),
+                    **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
+                    "upright": upright[k, window] == 1,
+                }
+            )
+        )
+    return pd.concat(tables, ignore_index=True)
 
 
 def mean_peaks(strides: xr.Dataset, robot: int | None = None) -> dict[str, float | int]:

@@ -24,13 +24,13 @@ from ...control import (
 from ...control.prediction import Analysis, analyze, predict, rehearse
 from ...dynamics import Rotors
 from ...errors import InvalidInput
-from ...gait import Gait, load_library
-from ...robot import JOINTS, load_robot, recorded_robot
+from ...gait import Gait, GaitLibrary, load_library
+from ...robot import JOINTS, RobotSpec, recorded_robot
 from ..report import number
 from ..results import Results
 from ..simulation import Schedule, simulate
 from ..world import Scenario
-from .learning_runs import learning_law
+from .learning_runs import learning_law, machine_and_gaits
 
 _BASELINE = 6.0
 _WIDTH = 96
@@ -73,7 +73,13 @@ STRIDES = Interval(1, 100_000)
 
 
 def simulate_learning(
-    spec: ControllerSpec, speeds: Sequence[float], scenario: Scenario, *, robot: str, strides: int
+    spec: ControllerSpec,
+    speeds: Sequence[float],
+    scenario: Scenario,
+    *,
+    robot: str | RobotSpec,
+    strides: int,
+    gaits: str | GaitLibrary = "pronk",
 ) -> xr.Dataset:
     """Simulate a short learning run, with the law of the stance only, and flights as planned.
 
@@ -84,12 +90,12 @@ def simulate_learning(
     speeds, strides = reals("speeds", speeds), whole("strides", strides, STRIDES)
     if not speeds:
         raise InvalidInput("no speeds; give at least one")
-    library = load_library(robot)
-    gaits = [library.at(speed) for speed in speeds]
-    longest = max(gait.duration for gait in gaits)
+    machine, library = machine_and_gaits(robot, gaits)
+    played = [library.at(speed) for speed in speeds]
+    longest = max(gait.duration for gait in played)
     return simulate(
-        load_robot(robot),
-        gaits,
+        machine,
+        played,
         replace(spec, flight_law=None, timing=None),
         scenario,
         schedule=Schedule(baseline=_BASELINE, learning=1.25 * (strides + 2) * longest),
@@ -114,6 +120,7 @@ def stored_learning(
         InvalidInput: More was learned than the prediction covers, or elsewhere.
     """
     learning_law(spec)
+    results.check_constant("the prediction")
     experiment = results.experiment
     if not _covered(spec):
         suitable = [

@@ -6,18 +6,23 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 
 from ..._typing import Array
 from ...control import ControllerSpec, InitialFeedforward, TorqueLibrary, load_controller
-from ...gait import Gait, load_library
-from ...robot import JOINTS, Robot, load_robot
+from ...gait import Gait, GaitLibrary
+from ...robot import Robot, RobotSpec
 from ..experiment import initial_feedforward, torque_library
 from ..metrics import STEADY_STRIDES, settling_stride
 from ..report import number
 from ..simulation import Schedule, simulate
 from ..world import Scenario
-from .learning_runs import COMPARED, learn, speeds_with_neighbours
+from .learning_runs import (
+    COMPARED,
+    learn,
+    machine_and_gaits,
+    peaks_by_stride,
+    speeds_with_neighbours,
+)
 
 LEARNERS = ("ilc", "model+ilc", "library+ilc")
 """The same laws, from nothing, from the model's feedforward, and from the torque library."""
@@ -28,7 +33,11 @@ _WORDS = {"none": "nothing", "model": "the model", "library": "the library"}
 
 
 def measure_seeding(
-    speeds: Sequence[float], scenario: Scenario, *, robot: str = "a1"
+    speeds: Sequence[float],
+    scenario: Scenario,
+    *,
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
 ) -> pd.DataFrame:
     """Learn at the inner speeds from each initial feedforward; the library holds the others only.
 
@@ -36,7 +45,8 @@ def measure_seeding(
         speeds: Increasing speeds [m/s], three or more. The library is learned at all of them,
             and each inner one begins with what its neighbours learned.
         scenario: The scenario.
-        robot: Short name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
 
     Returns:
         A row for each controller of `LEARNERS`, speed and stride: `controller`, `speed`, `stride`
@@ -47,10 +57,11 @@ def measure_seeding(
         InvalidInput: There are fewer than three speeds, or they do not increase.
     """
     speeds = speeds_with_neighbours("seeding", speeds)
-    machine, gaits_ = load_robot(robot), load_library(robot)
-    gaits = [gaits_.at(speed) for speed in speeds]
+    machine, library = machine_and_gaits(robot, gaits)
+    learned = [library.at(speed) for speed in speeds]
     specs = [load_controller(name) for name in LEARNERS]
-    stored, inner = torque_library(learn(machine, gaits, specs[0], scenario)), gaits[1:-1]
+    inner = learned[1:-1]
+    stored = torque_library(learn(machine, learned, specs[0], scenario))
     tables = []
     for spec in specs:
         strides = simulate(
@@ -62,7 +73,7 @@ def measure_seeding(
             rng=np.random.default_rng(0),
             initial=_seed(spec, machine, inner, stored),
         )
-        tables.append(_by_stride(spec, speeds[1:-1], strides))
+        tables.append(peaks_by_stride(strides).assign(controller=spec.name))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -138,31 +149,6 @@ def _seed(
     if spec.source == "library":
         return stored.left_out(np.array([gait.speed for gait in gaits]))[0]
     return initial_feedforward(spec, gaits, model=robot)
-
-
-def _by_stride(spec: ControllerSpec, speeds: Sequence[float], strides: xr.Dataset) -> pd.DataFrame:
-    """Peaks of each robot from the last stride before the learning on."""
-    learning, peak, upright = (
-        strides[name].to_numpy() for name in ("learning", "peak_error", "upright")
-    )
-    first, rows = np.argmax(learning == 1, axis=1), []
-    length = int((strides["count"].to_numpy() - first).min()) + 1  # as many of each robot
-    for k, speed in enumerate(speeds):
-        window = slice(first[k] - 1, first[k] - 1 + length)
-        peaks = peak[k, window]
-        legs = peaks.reshape(length, -1, len(JOINTS)).mean(axis=1)  # (length, 3)
-        rows.append(
-            pd.DataFrame(
-                {
-                    "controller": spec.name,
-                    "speed": speed,
-                    "stride": np.arange(length),
-                    **{joint: legs[:, JOINTS.index(joint)] for joint in COMPARED},
-                    "upright": upright[k, window] == 1,
-                }
-            )
-        )
-    return pd.concat(rows)
 
 
 def _curves(rows: pd.DataFrame, controller: str) -> Array:

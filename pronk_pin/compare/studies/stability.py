@@ -30,10 +30,11 @@ from ..._checks import SHARE, real, reals, sequence_of
 from ..._typing import Array, IntArray
 from ...control import PARTS, SAMPLES, ControllerSpec, Memory, phase_grid
 from ...errors import InvalidInput
-from ...gait import load_library
-from ...robot import load_robot
+from ...gait import Gait, GaitLibrary
+from ...robot import Robot, RobotSpec
 from ..simulation import Schedule, Simulation
 from ..world import Scenario
+from .learning_runs import machine_and_gaits
 
 COUPLINGS = (1.0, 0.8, 0.6, 0.5, 0.0)
 
@@ -59,7 +60,8 @@ def measure_stability(
     scenario: Scenario,
     *,
     couplings: Sequence[float] = COUPLINGS,
-    robot: str = "a1",
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
 ) -> pd.DataFrame:
     """Growth of the oscillation per stride of learning: predicted, and measured after kicks.
 
@@ -68,7 +70,8 @@ def measure_stability(
         speeds: Speeds [m/s].
         scenario: The scenario.
         couplings: Values of `ControllerSpec.coupling`.
-        robot: Name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
 
     Returns:
         A row a speed and coupling: `predicted` and `measured` growth, and `predicted_period` and
@@ -84,11 +87,11 @@ def measure_stability(
             f"controller '{spec.name}' does not learn in stance and in flight with a timing, which "
             "is what oscillates; choose one that does, as 'ilc'"
         )
-    library, rows = load_library(robot), []
-    for speed in speeds:
-        library.at(speed)  # there is one, before the others take their minutes
-    for speed in speeds:
-        study = _Study(replace(spec, guard=None), speed, scenario, robot)
+    machine, library = machine_and_gaits(robot, gaits)
+    rows = []
+    played = [library.at(speed) for speed in speeds]  # all are there before one takes its minutes
+    for speed, gait in zip(speeds, played, strict=True):
+        study = _Study(replace(spec, guard=None), gait, scenario, machine)
         matrices = study.stride_maps(couplings)
         for coupling, maps in zip(couplings, matrices, strict=True):
             predicted = _slowest_oscillation(np.linalg.eigvals(_companion(maps)))
@@ -133,14 +136,13 @@ class _Study:
 
     Args:
         spec: The controller, without a guard.
-        speed: Speed [m/s].
+        gait: The gait.
         scenario: The scenario.
-        robot: Name of the robot.
+        robot: The robot.
     """
 
-    def __init__(self, spec: ControllerSpec, speed: float, scenario: Scenario, robot: str) -> None:
-        self._robot, self._spec, self._scenario = load_robot(robot), spec, scenario
-        self._gait = load_library(robot).at(speed)
+    def __init__(self, spec: ControllerSpec, gait: Gait, scenario: Scenario, robot: Robot) -> None:
+        self._robot, self._spec, self._scenario, self._gait = robot, spec, scenario, gait
         schedule = Schedule(startup=0.2, baseline=1.0, learning=_LEARNING)
         learning = self._simulation(1, replace(spec, coupling=_STABLE), schedule)
         learning.run()

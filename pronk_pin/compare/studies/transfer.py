@@ -11,13 +11,20 @@ import xarray as xr
 
 from ..._typing import Array
 from ...control import ControllerSpec, InitialFeedforward
-from ...gait import Gait, load_library
-from ...robot import load_robot
+from ...gait import Gait, GaitLibrary
+from ...robot import RobotSpec
 from ..experiment import torque_library
 from ..report import number
 from ..simulation import Schedule, simulate
 from ..world import Scenario
-from .learning_runs import COMPARED, learn, learning_law, mean_peaks, speeds_with_neighbours
+from .learning_runs import (
+    COMPARED,
+    learn,
+    learning_law,
+    machine_and_gaits,
+    mean_peaks,
+    speeds_with_neighbours,
+)
 
 TOLERANCE = 0.25
 """Relative excess that the error may have in another task over that where it was learned."""
@@ -43,7 +50,8 @@ def measure_transfers(
     home: Scenario,
     scenarios: Sequence[Scenario],
     *,
-    robot: str = "a1",
+    robot: str | RobotSpec = "a1",
+    gaits: str | GaitLibrary = "pronk",
 ) -> pd.DataFrame:
     """Compare replay at home, at speeds left out, and in other scenarios with learning there.
 
@@ -52,7 +60,8 @@ def measure_transfers(
         speeds: Increasing speeds [m/s], three or more.
         home: Where the stored feedforward is learned.
         scenarios: Where it is tried.
-        robot: Short name of the robot.
+        robot: The robot, and
+        gaits: its gaits, as an `Experiment` takes them.
 
     Returns:
         A row for each transfer, and for each speed that was left out: `task`; mean peaks over the
@@ -63,18 +72,18 @@ def measure_transfers(
     """
     learning_law(spec)
     speeds = speeds_with_neighbours("transfer", speeds)
-    machine, library = load_robot(robot), load_library(robot)
-    gaits = [library.at(speed) for speed in speeds]
+    machine, library = machine_and_gaits(robot, gaits)
+    played = [library.at(speed) for speed in speeds]
     frozen = replace(spec, law=None, flight_law=None)
-    learning = learn(machine, gaits, spec, home)
+    learning = learn(machine, played, spec, home)
     stored = torque_library(learning)
     initial, inner = stored.initial_feedforward(np.array(speeds)), np.array(speeds)[1:-1]
     left_out, reusable = stored.left_out(inner)
     learned = _errors(learning)
 
-    def replay(gaits: Sequence[Gait], world: Scenario, initial: InitialFeedforward) -> xr.Dataset:
+    def replay(own: Sequence[Gait], world: Scenario, initial: InitialFeedforward) -> xr.Dataset:
         rng = np.random.default_rng(0)
-        return simulate(machine, gaits, frozen, world, schedule=_REPLAY, rng=rng, initial=initial)
+        return simulate(machine, own, frozen, world, schedule=_REPLAY, rng=rng, initial=initial)
 
     def row(task: str, replayed: Array, relearned_errors: Array, reuse: bool) -> dict[str, object]:
         gains_little = may_be_reused(replayed, relearned_errors)
@@ -86,15 +95,15 @@ def measure_transfers(
         errors = _errors(replayed)
         return row(task, errors, _errors(relearned), may_be_reused(errors, learned))
 
-    rows = [tried("at home", replay(gaits, home, initial), learning)]
-    between = replay(gaits[1:-1], home, left_out)
+    rows = [tried("at home", replay(played, home, initial), learning)]
+    between = replay(played[1:-1], home, left_out)
     for k, speed in enumerate(inner):
         # Robots do not know of each other: learning at home was learning at this speed, too.
         errors, relearned_errors = _errors(between, k), _errors(learning, k + 1)
         rows.append(row(f"left out {speed:+.2f} m/s", errors, relearned_errors, bool(reusable[k])))
     for scenario in scenarios:
-        relearned = learn(machine, gaits, spec, scenario)
-        rows.append(tried(scenario.name, replay(gaits, scenario, initial), relearned))
+        relearned = learn(machine, played, spec, scenario)
+        rows.append(tried(scenario.name, replay(played, scenario, initial), relearned))
     return pd.DataFrame(rows)
 
 

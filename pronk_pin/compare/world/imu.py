@@ -6,9 +6,9 @@ import numpy as np
 
 from ..._typing import Array, IntArray
 from ...robot import rotation_matrix
+from .engine import World
 from .scenario import Scenario
 from .sensors import SensorSuite
-from .world import World
 
 
 class InertialUnit:

@@ -5,7 +5,9 @@ is a world to begin with, and what is different in it, joined by `+`. Each misma
 its own, and takes another after `=`, in SI units. Without a world in front a mismatch is one of the
 nominal scenario. Such a name says everything: the seed of a sampled scenario stands in it too. In
 front of a name may stand a scenario of one's own, by its address or its entry point:
-`my_package.worlds:hot+slope`; in Python they are added as they are: `hot + "slope"`.
+`my_package.worlds:hot+slope`; in Python they are added as they are: `hot + "slope"`. An engine
+joins likewise, by its name or the address of one of one's own: `nominal+drake`,
+`payload+my_engines:DART`; without one it is MuJoCo's.
 """
 
 from __future__ import annotations
@@ -54,6 +56,10 @@ ByJoint: TypeAlias = float | tuple[float, ...]
 """A number for all joints, one for each kind of joint (hip, thigh, calf), or one for each joint in
 the order of q."""
 
+DEFAULT_ENGINE = "mujoco"
+OTHER_ENGINES = ("drake",)
+"""Names of the engines that are shipped; that of the first is left out in a scenario's name."""
+
 _BY_JOINT = {
     "armature": Interval(0, 1, "kg m^2"),
     "damping": Interval(0, 50, "N m s/rad"),
@@ -95,7 +101,7 @@ class Scenario:
     The robot is what its URDF or MJCF says; what the scenario adds comes on top of that. Values and
     defaults stand here. How they act: `motors.py` (delay, speed, pushes), `payload.py` (payload and
     centre of mass), `ground.py` (contact, the feet's friction, steps), `sensors.py`, and
-    `build_model` in `world.py` for what MuJoCo has a parameter for (joints, slope, gravity).
+    `build_model` in `model.py` for what MuJoCo has a parameter for (joints, slope, gravity).
 
     A slope is played as gravity that leans back, so that the ground's frame stays the world's: x
     goes up the slope, z stands on it, and a locked trunk stays parallel to it.
@@ -136,6 +142,10 @@ class Scenario:
         push_duration: How long a push lasts [s].
         seed: Draws the heights of rough ground and of steps.
         timestep: Time step of the simulation and of the control [s].
+        engine: Engine that simulates it: one of `ENGINES`, an entry point's name, or the address
+            of one, module:object.
+        engine_sha256: SHA-256 of the module of an engine at an address, by default as it is now;
+            another one is refused.
         mjcf: Path of an MJCF that stands in for the robot's own URDF; empty for the URDF.
         edit: Address, module:function, of a function that changes the world's `mujoco.MjSpec`
             before it is compiled: terrain, another foot, springs. In Python the function itself.
@@ -168,6 +178,8 @@ class Scenario:
     push_duration: float = 0.05
     seed: int = 0
     timestep: float = 0.001
+    engine: str = DEFAULT_ENGINE
+    engine_sha256: str = ""
     mjcf: str = ""
     edit: str = ""
     edit_sha256: str = ""
@@ -189,11 +201,14 @@ class Scenario:
         object.__setattr__(self, "no_load_speed", no_load)
         object.__setattr__(self, "seed", known_seed(f"{prefix}seed", self.seed))
         instance_of(f"{prefix}sensors", self.sensors, Sensors)
+        text(f"{prefix}engine", self.engine)
         text(f"{prefix}mjcf", self.mjcf)
         object.__setattr__(self, "edit", function_address(f"{prefix}edit", self.edit))
-        text(f"{prefix}edit_sha256", self.edit_sha256)
-        if self.edit and not self.edit_sha256:
-            object.__setattr__(self, "edit_sha256", source_sha256(imported(self.edit)))
+        for name in ("edit", "engine"):
+            address, digest = getattr(self, name), f"{name}_sha256"
+            text(prefix + digest, getattr(self, digest))
+            if is_address(address) and not getattr(self, digest):
+                object.__setattr__(self, digest, source_sha256(imported(address)))
         self._check_ground()
         self._check_motors()
         for name in ("delay", "touchdown_latency", "touchdown_jitter"):
@@ -210,6 +225,8 @@ class Scenario:
             InvalidInput: Both change the same thing, and differently.
             UnknownName: There is no scenario of that name.
         """
+        if isinstance(other, str) and _is_engine(other):
+            return self.in_engine(other)
         other, changes = load_scenario(other), {}
         own = dict(self._mismatches())
         for name, value in other._mismatches():
@@ -223,6 +240,21 @@ class Scenario:
     def __radd__(self, other: str) -> Scenario:
         """A scenario by name with the mismatches of this one."""
         return load_scenario(other) + self
+
+    def in_engine(self, engine: str) -> Scenario:
+        """This scenario, simulated by an engine of that name or address.
+
+        Raises:
+            UnknownName: There is none of that name.
+            InvalidInput: The address cannot be imported.
+        """
+        if not is_address(engine):
+            known = (DEFAULT_ENGINE, *OTHER_ENGINES, *announced_names("engine"))
+            known_name("engine", engine, known)
+        if engine == self.engine:
+            return self
+        name = f"{self.name}+{_engine_name(engine)}"
+        return replace(self, name=name, engine=engine, engine_sha256="")
 
     def by_joint(self, name: str, robot: Robot) -> Array:
         """One of the joints' parameters for every joint of a robot, in the order of q, (12,).
@@ -360,8 +392,11 @@ def load_scenario(name: str | Scenario, *, mjcf: str = "") -> Scenario:
     scenario = _world(first)
     if scenario is None:
         scenario, rest = BASE_SCENARIOS["nominal"], [first, *rest]
-    values = _values(name, rest)
-    changes: dict[str, Any] = {}
+    engines = [part for part in rest if _is_engine(part)]
+    if len(engines) > 1:
+        raise InvalidInput(f"scenario '{name}': {len(engines)} engines; keep one of them")
+    values = _values(name, [part for part in rest if part not in engines])
+    changes: dict[str, Any] = {} if not engines else {"engine": engines[0]}
     for part, value in values.items():
         try:
             changed_by = KNOWN[part].changes(value)
@@ -374,15 +409,17 @@ def load_scenario(name: str | Scenario, *, mjcf: str = "") -> Scenario:
                 )
             changes[attribute] = changed
     world = [] if values and scenario.name == "nominal" else [scenario.name]
-    short = "+".join([*world, *(_written(part, value) for part, value in values.items())])
+    written = (_written(part, value) for part, value in values.items())
+    short = "+".join([*world, *written, *map(_engine_name, engines)])
     return replace(scenario, **changes, name=short, mjcf=mjcf)
 
 
 def shipped_scenario(name: str) -> Scenario | None:
     """The scenario that a name means everywhere, whatever is installed; None without one."""
     first, *rest = (part.partition("=")[0] for part in name.split("+"))
-    known = {first in BASE_SCENARIOS, first in KNOWN, _SAMPLED.fullmatch(first) is not None}
-    if True not in known or not all(part in KNOWN for part in rest):
+    worlds = (*BASE_SCENARIOS, *KNOWN, *OTHER_ENGINES)
+    known = {first in worlds, _SAMPLED.fullmatch(first) is not None}
+    if True not in known or not all(part in (*KNOWN, *OTHER_ENGINES) for part in rest):
         return None
     return load_scenario(name)
 
@@ -392,11 +429,25 @@ def _world(name: str) -> Scenario | None:
     sampled = _SAMPLED.fullmatch(name)
     if sampled:
         return _sample(*map(int, sampled.groups()))
-    if name.partition("=")[0] in KNOWN:
+    if name.partition("=")[0] in KNOWN or name in OTHER_ENGINES:
         return None
     if name in BASE_SCENARIOS or is_address(name) or name in announced_names("scenario"):
         return find("scenario", name, BASE_SCENARIOS, Scenario)
     return None
+
+
+def _is_engine(part: str) -> bool:
+    """Whether a part of a name after its world is that of an engine."""
+    if part in BASE_SCENARIOS or part in announced_names("scenario"):
+        return False
+    if is_address(part):
+        return not isinstance(imported(part), Scenario)
+    return part in OTHER_ENGINES or part in announced_names("engine")
+
+
+def _engine_name(engine: str) -> str:
+    """Name of an engine, of one at an address its own."""
+    return str(getattr(imported(engine), "name", engine)) if is_address(engine) else engine
 
 
 def _values(name: str, parts: list[str]) -> dict[str, float]:
@@ -407,7 +458,9 @@ def _values(name: str, parts: list[str]) -> dict[str, float]:
             raise InvalidInput(f"scenario '{name}': a world, as {part}, comes first in a name")
         mismatch, equals, number = part.partition("=")
         if mismatch not in KNOWN:
-            raise UnknownName("scenario", part, (*BASE_SCENARIOS, *KNOWN, "random-SEED-INDEX"))
+            raise UnknownName(
+                "scenario", part, (*BASE_SCENARIOS, *KNOWN, *OTHER_ENGINES, "random-SEED-INDEX")
+            )
         if mismatch in values:
             raise InvalidInput(f"scenario '{name}': {mismatch} is in it twice; keep one of them")
         try:

@@ -33,12 +33,13 @@ class SpeedEstimator:
     Attributes:
         speed: The estimates [m/s], shape (n,).
         sideways: Those of the speed to the left, in the world [m/s], shape (n,).
+        upward: Those of the speed upward at lift-off [m/s], shape (n,).
     """
 
     def __init__(self, robot: Robot, n: int, *, time_constant: float, timestep: float) -> None:
         time_constant = real("speed filter: time_constant", time_constant, SPEED_FILTER)
         self._robot, self._time_constant, self._timestep = robot, time_constant, timestep
-        self.speed, self.sideways = np.zeros((2, n))
+        self.speed, self.sideways, self.upward = np.zeros((3, n))
 
     def update(self, rows: IntArray, log: PhaseLog) -> Array:
         """Update the estimates of robots that have just finished a stance, and return them [m/s].
@@ -73,8 +74,12 @@ class SpeedEstimator:
             forward = forward + self._time_constant * acceleration
             valid &= np.isfinite(forward) | ~used
             forward = np.where(used, forward, 0.0)
-        aside = velocity[:, 1].reshape(n, ticks)
-        for measured, speeds in ((forward, self.speed), (aside, self.sideways)):
+        aside, upward = velocity[:, 1:].T.reshape(2, n, ticks)
+        for measured, speeds in (
+            (forward, self.speed),
+            (aside, self.sideways),
+            (upward, self.upward),
+        ):
             filtered = first_order(
                 measured,
                 speeds[rows],

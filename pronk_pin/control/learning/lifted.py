@@ -9,6 +9,7 @@ off decides how it lands. The model therefore carries the state at touchdown fro
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -148,17 +149,13 @@ class LiftedModel:
 
     def delayed(self, samples: int) -> LiftedModel:
         """The model with the feedforward delayed by some samples of the grid."""
-        shift = np.eye(self.torque.size, k=-samples * self.shape[1])
-        return self._through(shift)
+        later = samples * self.shape[1]
+        return self._responding(lambda response: np.pad(response[:, later:], ((0, 0), (0, later))))
 
     def scaled(self, factor: float) -> LiftedModel:
         """The model with the feedforward scaled by a factor."""
-        return self._through(factor * np.eye(self.torque.size))
+        return self._responding(lambda response: factor * response)
 
-    def _through(self, actuator: Array) -> LiftedModel:
-        return replace(
-            self,
-            angle=self.angle @ actuator,
-            rate=self.rate @ actuator,
-            B=self.B @ actuator,
-        )
+    def _responding(self, change: Callable[[Array], Array]) -> LiftedModel:
+        """The model with other responses to the feedforward, shape (..., size)."""
+        return replace(self, angle=change(self.angle), rate=change(self.rate), B=change(self.B))

@@ -8,11 +8,12 @@ from .contact_detection import ContactDetector, ImpactDetector, StanceContact, T
 from .context import ControlContext
 from .filters import PAPER_A, PAPER_B, ZeroPhaseFilter, first_order, look_ahead
 from .record import PARTS, SAMPLES, PhaseLog, StrideRecord, held, phase_grid, resample
-from .reference import FlightTiming, Reference
+from .reference import LATEST_TOUCHDOWN, FlightTiming, Reference
 from .speed_profile import SpeedProfile
 from .tape import Gains, Tape, clip_torque
 
 __all__ = [
+    "LATEST_TOUCHDOWN",
     "PAPER_A",
     "PAPER_B",
     "PARTS",

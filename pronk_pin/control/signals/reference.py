@@ -10,7 +10,10 @@ import numpy as np
 from ..._checks import SHARE, Interval, keep_reals
 from ..._typing import Array, IntArray
 from ...errors import InvalidInput
-from ...gait import GaitPhase
+from ...gait import GaitPhase, joint_references
+
+LATEST_TOUCHDOWN = 2.0
+"""Longest flight, over its planned duration, after which it ends without a touchdown."""
 
 _NOTICED = 2e-5
 """Change of a duration [s] below which a reference stays unchanged."""
@@ -93,22 +96,36 @@ class Reference:
         reference._tabulate(np.arange(len(parts)))
         return reference
 
-    def change(self, rows: IntArray, parts: Sequence[GaitPhase], latest: float) -> None:
-        """Change some robots to another gait's part, stretched as theirs was.
+    def change(
+        self,
+        rows: IntArray,
+        parts: Sequence[GaitPhase],
+        latest: float,
+        *,
+        stretched: Array | None = None,
+    ) -> None:
+        """Change some robots to another gait's part.
+
+        Args:
+            rows: Which robots.
+            parts: Their parts, for up to `latest` times the planned duration.
+            latest: See `of`.
+            stretched: Durations over the planned ones, shape (m,); by default as theirs were.
 
         Raises:
             InvalidInput: A part is longer than those that there is room for.
         """
-        for row, part in zip(rows, parts, strict=True):
+        if stretched is None:
+            stretched = self.duration[rows] / self.planned[rows]
+        for row, part, longer in zip(rows, parts, stretched, strict=True):
             ticks = int(np.round(latest * part.duration / self.timestep))
             if ticks > self.phase.shape[1]:
                 raise InvalidInput(
                     f"a {part.name} of {part.duration:g} s is longer than any that was announced; "
                     "name its gait among those that may be changed to"
                 )
-            stretched = self.duration[row] / self.planned[row]
             self.parts[row], self.planned[row], self.ticks[row] = part, part.duration, ticks
-            self.duration[row] = stretched * part.duration
+            self.duration[row] = longer * part.duration
         self._tabulate(rows)
 
     def stretch(self, rows: IntArray, duration: Array) -> None:
@@ -118,10 +135,16 @@ class Reference:
         self._tabulate(rows[noticed])
 
     def _tabulate(self, rows: IntArray) -> None:
-        for row, end in zip(rows, self.ends(rows), strict=True):
+        if not rows.size:
+            return
+        ends = self.ends(rows)
+        phases = [
+            np.minimum(np.arange(end) * self.timestep / self.duration[row], 1.0)
+            for row, end in zip(rows, ends, strict=True)
+        ]
+        curves = joint_references([self.parts[row] for row in rows], phases)
+        for row, end, s, (position, velocity) in zip(rows, ends, phases, curves, strict=True):
             part, duration = self.parts[row], self.duration[row]
-            s = np.minimum(np.arange(end) * self.timestep / duration, 1.0)
-            position, velocity = part.joint_reference(s)
             velocity[s >= 1.0] = 0.0
             # Past its end a flight holds the posture of touchdown.
             self.phase[row, :end], self.phase[row, end:] = s, s[-1]

@@ -10,6 +10,7 @@ from .gait_figures import write_gait_figures
 from .knowledge_figure import knowledge_ladder, shows_knowledge
 from .learning_figures import errors_by_seed, learning_curves, predicted_and_measured
 from .skill_figures import gains_figure, transfers_figure
+from .still_figure import SPREAD, still
 from .suite_figures import by_scenario, heat_map, peak_curves
 from .tracking_figures import (
     LABELS,
@@ -23,6 +24,7 @@ from .tracking_figures import (
 
 __all__ = [
     "LABELS",
+    "SPREAD",
     "by_scenario",
     "driving_figure",
     "errors_by_seed",
@@ -35,6 +37,7 @@ __all__ = [
     "peak_curves",
     "predicted_and_measured",
     "shows_knowledge",
+    "still",
     "torque_library",
     "torque_surface",
     "tracking",

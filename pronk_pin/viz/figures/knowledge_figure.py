@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ...compare.metrics import LEARNER
 from ...compare.report import SHOWN, Overview
-from ..figure_style import TWO_COLUMNS, legend_below, look, new_figure, styled
+from ..figure_style import TWO_COLUMNS, legend_below, log_axis, look, new_figure, styled
 
 LADDER = {
     "pd": "nothing",
@@ -55,7 +55,7 @@ def knowledge_ladder(tables: Mapping[str, Overview]) -> Figure:
                         ls=style.get("ls", "-"),
                     )
         axes.set_title(scenario)
-        axes.set_yscale("log")
+        log_axis(axes)
         axes.set_xticks(range(len(LADDER)), list(LADDER.values()))
     for axes in panels[len(tables) :]:
         axes.set_visible(False)

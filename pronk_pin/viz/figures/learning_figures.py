@@ -20,6 +20,7 @@ from ..figure_style import (
     TWO_COLUMNS,
     in_order,
     legend_below,
+    log_axis,
     look,
     new_figure,
     say,
@@ -108,7 +109,7 @@ def learning_curves(strides: Mapping[str, xr.Dataset]) -> Figure:
         axes.set_title(f"{joint}: mean and range over the speeds")
         axes.set_xlabel("strides since the learning was switched on")
         axes.set_ylabel("peak stance error [rad]")
-        axes.set_ylim(bottom=0.0)
+        log_axis(axes)
     legend_below(figure, *panels[0].get_legend_handles_labels())
     return figure
 

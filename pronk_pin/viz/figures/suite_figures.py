@@ -19,8 +19,10 @@ from ..figure_style import (
     TWO_COLUMNS,
     in_order,
     legend_below,
+    log_axis,
     look,
     new_figure,
+    plain_ticks,
     say,
     styled,
 )
@@ -28,7 +30,7 @@ from ..figure_style import (
 _STRIDES = 40
 """Strides of learning that are shown."""
 
-_COLUMNS = 3
+_COLUMNS = 4
 
 
 @styled
@@ -40,14 +42,15 @@ def heat_map(tables: Mapping[str, Overview]) -> Figure:
             instead of it.
     """
     controllers = in_order(name for table in tables.values() for name in table)
-    figure = new_figure(TWO_COLUMNS, 1.1 + 0.27 * len(tables))
+    figure = new_figure(TWO_COLUMNS, 1.6 + 0.27 * len(tables))
     panels = figure.subplots(1, len(SHOWN), sharey=True)
     rows = [[table.get(name) for name in controllers] for table in tables.values()]
     peaks = {
-        joint: np.array([[_peak(cell, joint) for cell in row] for row in rows]) for joint in SHOWN
+        joint: 1e3 * np.array([[_peak(cell, joint) for cell in row] for row in rows])
+        for joint in SHOWN
     }
     errors = np.concatenate([values[np.isfinite(values)] for values in peaks.values()])
-    norm = LogNorm(errors.min(), errors.max()) if errors.size else LogNorm(1e-3, 1.0)
+    norm = LogNorm(errors.min(), errors.max()) if errors.size else LogNorm(1.0, 1e3)
     for axes, joint in zip(panels, SHOWN, strict=True):
         image = axes.imshow(peaks[joint], cmap=SEQUENTIAL, norm=norm, aspect="auto")
         _write_cells(axes, rows, peaks[joint], norm)
@@ -59,8 +62,10 @@ def heat_map(tables: Mapping[str, Overview]) -> Figure:
         axes.set_yticks(range(len(tables)), list(tables))
         axes.grid(visible=False)
         axes.set_title(joint)
-    bar = figure.colorbar(image, ax=panels, shrink=0.9)
-    bar.set_label("mean peak stance error [rad]")
+    # Below: beside a low figure its name would be cut off.
+    bar = figure.colorbar(image, ax=panels, location="bottom", aspect=50, shrink=0.6)
+    bar.set_label("mean peak stance error [mrad], as in the cells")
+    plain_ticks(bar.ax.xaxis)
     return figure
 
 
@@ -71,13 +76,13 @@ def _peak(cell: ControllerOverview | None, joint: str) -> float:
 def _write_cells(
     axes: Axes, rows: list[list[ControllerOverview | None]], peaks: Array, norm: LogNorm
 ) -> None:
-    """The error of each cell in milliradians, and how many fell."""
+    """The error of each cell [mrad], and how many fell."""
     for (row, column), value in np.ndenumerate(peaks):
         cell, color = rows[row][column], "black"
         if cell is None:
             continue
         if np.isfinite(value):
-            text = f"{1e3 * value:.0f}" + (f"\n{cell.fell} fell" if cell.fell else "")
+            text = f"{value:.0f}" + (f"\n{cell.fell} fell" if cell.fell else "")
             light = np.dot(colormaps[SEQUENTIAL](float(norm(value)))[:3], (0.3, 0.6, 0.1)) > 0.5
             color = "black" if light else "white"
         else:
@@ -96,9 +101,9 @@ def peak_curves(histories: Mapping[str, list[PeakHistory]], *, joint: str) -> Fi
         joint: "calf" or "thigh".
     """
     rows = -(-len(histories) // _COLUMNS)
-    columns = min(_COLUMNS, len(histories))
-    figure = new_figure(TWO_COLUMNS, 0.5 + 1.45 * rows)
-    panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    columns = -(-len(histories) // rows)
+    figure = new_figure(TWO_COLUMNS, 0.7 + 1.6 * rows)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes in panels.ravel()[len(histories) :]:
         axes.set_visible(False)
     handles: dict[str, object] = {}
@@ -112,11 +117,13 @@ def peak_curves(histories: Mapping[str, list[PeakHistory]], *, joint: str) -> Fi
                 handles[look(controller).label] = line
         axes.set_title(scenario)
         if axes.lines:
-            axes.set_yscale("log")
+            log_axis(axes)
         else:
             say(axes, "no robot stayed up")
-    for axes in panels[-1]:
-        axes.set_xlabel("strides of learning")
+    for column in panels.T:
+        lowest = [axes for axes in column if axes.get_visible()][-1]
+        lowest.set_xlabel("strides of learning")
+        lowest.tick_params(labelbottom=True)
     for axes in panels[:, 0]:
         axes.set_ylabel(f"{joint}: peak [rad]")
     legend_below(figure, handles.values(), handles)
@@ -141,7 +148,7 @@ def by_scenario(table: pd.DataFrame) -> Figure:
             style = look(controller)
             axes.plot(errors[controller], rows, style.marker, color=style.color, label=style.label)
         if np.isfinite(errors.to_numpy(dtype=float)).any():
-            axes.set_xscale("log")
+            log_axis(axes, "x")
         else:
             say(axes, "no robot stayed up")
         axes.set_title(joint)

@@ -13,6 +13,7 @@ from ..._typing import Array, IntArray
 from ...compare import steady
 from ...compare.metrics import of_first_leg, of_papers_robot, robots, table_1
 from ...compare.report import SHOWN
+from ...errors import InvalidInput
 from ..figure_style import (
     ACCENT,
     DIVERGING,
@@ -22,6 +23,7 @@ from ..figure_style import (
     TWO_COLUMNS,
     in_order,
     legend_below,
+    log_axis,
     look,
     new_figure,
     styled,
@@ -111,15 +113,19 @@ def torque_library(strides: xr.Dataset) -> Figure:
 
 @styled
 def torque_surface(strides: xr.Dataset) -> Figure:
-    """The learned torque as a surface over speed and stance phase, by its contours."""
+    """The learned torque as a surface over speed and stance phase, by its contours.
+
+    Raises:
+        InvalidInput: There is one speed only, which is a curve and no surface.
+    """
+    if strides.sizes["speed"] < 2:
+        raise InvalidInput("one speed is no surface; draw `torque_library`")
     torque = _learned(strides)
     figure = new_figure(TWO_COLUMNS, 2.6)
     for axes, joint in zip(figure.subplots(1, 2), SHOWN, strict=True):
         name = of_first_leg(torque, joint)
         surface = torque.sel(joint=name).transpose("speed", "phase")
         x, y, z = (a.to_numpy() for a in (strides["phase"], strides["speed"], surface))
-        if len(y) < 2:  # one speed is no surface: a stripe
-            y, z = y[0] + np.array([-0.05, 0.05]), np.repeat(z, 2, axis=0)
         signed = bool(z.min() < 0.0 < z.max())
         largest = float(np.abs(z).max())
         limits = {"vmin": -largest, "vmax": largest} if signed else {}
@@ -197,11 +203,12 @@ def errors_by_speed(summary: pd.DataFrame, *, scenario: str) -> Figure:
             peaks = robots(summary, scenario=scenario, controller=controller, joint=joint)
             mean, style = peaks.mean().dropna(), look(controller)
             if len(mean):
-                axes.plot(mean.index, mean, marker=style.marker, **style.curve)
+                # Hollow: of two that lie on each other both are seen.
+                axes.plot(mean.index, mean, marker=style.marker, mfc="none", **style.curve)
         axes.set_title(joint)
         axes.set_xlabel("speed [m/s]")
         axes.set_ylabel("peak stance error [rad]")
-        axes.set_ylim(bottom=0.0)
+        log_axis(axes)
     legend_below(figure, *panels[0].get_legend_handles_labels())
     return figure
 

@@ -8,13 +8,14 @@ from .browser import Browser
 from .live import DURATION, LiveServer, known_port, serve
 from .replay import write_replay
 from .show import play, show
-from .video import Film, write_film, write_png
+from .video import Film, check_film, write_film, write_png
 
 __all__ = [
     "DURATION",
     "Browser",
     "Film",
     "LiveServer",
+    "check_film",
     "known_port",
     "play",
     "serve",

@@ -61,8 +61,10 @@ _START = """\
     socket.binaryType = "arraybuffer";
     socket.onmessage = (event) => player.stream(event.data);
     socket.onclose = () => {
-      words.textContent = "The program behind this page has ended.";
-      setTimeout(() => fetch("").then(() => location.reload()).catch(() => {}), 2000);
+      words.textContent = "The program behind this page has ended; it is looked for again.";
+      const again = () => setTimeout(
+        () => fetch("").then(() => location.reload()).catch(again), 1000);
+      again();
     };
   }
   fetchBytes("robot").then((robot) => Player.start({

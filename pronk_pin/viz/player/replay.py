@@ -29,6 +29,7 @@ _START = """\
   let player;
   Player.start({
     robot: bytes("$robot"), options: $options, first: $first,
+    held: Object.keys(films).map((key) => JSON.parse(key)),
     film: async (choice) => {
       const text = films[JSON.stringify(Object.values(choice))];
       if (!text) throw new Error("This choice is not in the file.");

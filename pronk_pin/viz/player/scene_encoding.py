@@ -12,7 +12,7 @@ from ..._typing import Array
 from ...kinematics import foot_positions
 from ...robot import Robot
 from ..figure_style import SEQUENTIAL
-from ..scenes import GHOST_COLOR, Scene, Track
+from ..scenes import GHOST_COLOR, History, Scene, Track
 from .packing import pack
 
 FPS = 60.0
@@ -77,12 +77,16 @@ def film_blob(scene: Scene, *, fps: float = FPS) -> bytes:
         {
             "title": scene.title,
             "caption": scene.caption,
-            "fps": fps,
             "start": scene.start,
+            "times": (times - scene.start)[:, None],
             "view": scene.view(times),
             "friction": scene.friction,
             "forceScale": scene.force_scale,
             "forceWindow": scene.force_window,
+            "slope": scene.slope,
+            "payload": scene.payload,
+            "payloadPosition": list(scene.payload_position),
+            "soft": scene.soft,
             "errorScale": _end(scene, rows, "error", _ERROR_STEPS),
             "useScale": _end(scene, rows, "torque", _USE_STEPS),
             "tracks": [_track(track, row) for track, row in zip(scene.tracks, rows, strict=True)],
@@ -106,14 +110,32 @@ def row_bytes(scene: Scene, rows: list[dict[str, Array]], view: Array) -> bytes:
 
 def _track(track: Track, row: dict[str, Array]) -> dict[str, Any]:
     color = track.color or (GHOST_COLOR if track.ghost else None)
+    accent = track.accent or color
     return {
         "name": track.name,
         "ghost": track.ghost,
         "color": to_hex(color) if color else None,
+        "accent": to_hex(accent) if accent else None,
+        "history": _history(track.history),
         "caption": track.caption,
         "marks": [list(mark) for mark in track.marks],
         "channels": list(track.channels),
         **row,
+    }
+
+
+def _history(history: History | None) -> dict[str, Any] | None:
+    """Strides of a whole run, with errors to the tenth of a milliradian; None where not finite."""
+    if history is None:
+        return None
+    return {
+        "stride": history.stride.tolist(),
+        "t": [round(float(t), 4) for t in history.t],
+        "errors": {
+            joint: [round(float(e), 4) if np.isfinite(e) else None for e in values]
+            for joint, values in history.errors.items()
+        },
+        "began": history.began,
     }
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +21,7 @@ from ..._checks import NOT_NEGATIVE, POSITIVE, flag, none_or, real, text, whole
 from ...errors import FileProblem, InvalidInput, cannot_write
 from ...storage import partial_path, temporary_folder, write_file
 from ..scenes import Scene
-from .browser import Browser
+from .browser import Browser, find_browser
 from .replay import RATE, write_replay
 
 
@@ -100,8 +103,7 @@ def write_film(
     path = _writable(path)
     if path.suffix not in (".gif", ".mp4"):
         raise InvalidInput(f"films are written as .gif or .mp4, not as '{path.name}'")
-    if path.suffix == ".mp4":
-        _encoder()
+    check_film(path)
     with _stage(scene, film) as picture:
         times = tqdm(
             film.times(scene.duration), desc="drawing", unit=" frames", disable=not progress
@@ -148,33 +150,66 @@ def _write_gif(path: Path, pictures: Iterator[Image.Image], film: Film) -> None:
 
 
 def _write_mp4(path: Path, pictures: Iterator[Image.Image], film: Film) -> None:
-    """Write a video, H.264."""
-    with partial_path(path) as partial:
-        writer = _encoder().write_frames(
-            str(partial), (film.width, film.height), fps=film.fps, quality=7, macro_block_size=2
-        )
-        try:
-            writer.send(None)
-            for picture in pictures:
-                writer.send(np.ascontiguousarray(picture))
-        finally:
-            writer.close()
+    """Write a video, H.264, by the ffmpeg of `find_encoder`."""
+    with partial_path(path) as partial, tempfile.TemporaryFile() as log:
+        command = [find_encoder(), "-y", "-loglevel", "error", "-f", "rawvideo"]
+        command += ["-pix_fmt", "rgb24", "-s", f"{film.width}x{film.height}"]
+        command += ["-r", f"{film.fps:g}", "-i", "-", "-an", "-vcodec", "libx264", "-crf", "18"]
+        command += ["-pix_fmt", "yuv420p", "-f", "mp4", str(partial)]
+        with subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log
+        ) as encoder:
+            assert encoder.stdin is not None
+            try:
+                for picture in pictures:
+                    encoder.stdin.write(np.ascontiguousarray(picture).tobytes())
+                encoder.stdin.close()
+            except BrokenPipeError:
+                pass  # what it says is told below
+            except BaseException:
+                encoder.kill()
+                raise
+            failed = encoder.wait() != 0
+        if failed:
+            log.seek(0)
+            said = " ".join(log.read().decode(errors="replace").split())
+            raise InvalidInput(f"{command[0]} cannot encode H.264 ({said}); write a .gif")
 
 
-def _encoder() -> Any:
-    """The module that brings and drives ffmpeg.
+def find_encoder() -> str:
+    """Path of ffmpeg's program: one that is installed, or else that of imageio-ffmpeg.
 
     Raises:
-        InvalidInput: It is not installed.
+        InvalidInput: There is none.
     """
+    if program := shutil.which("ffmpeg"):
+        return program
     try:
         import imageio_ffmpeg
     except ImportError as error:
         raise InvalidInput(
-            "videos are encoded by imageio-ffmpeg, which is not installed; run "
-            "'pip install pronk-pin[video]', or write a .gif"
+            "videos are encoded by ffmpeg, which is not installed; install it ('apt install "
+            "ffmpeg', or 'pip install pronk-pin[video]', which brings its own), or write a .gif"
         ) from error
-    return imageio_ffmpeg
+    return str(imageio_ffmpeg.get_ffmpeg_exe())
+
+
+def check_film(path: Path | str) -> None:
+    """Check that a picture or a film can be made, before anything is computed for it.
+
+    Args:
+        path: Its file: .png, .gif or .mp4.
+
+    Raises:
+        InvalidInput: It is none of these, or there is no encoder for MP4.
+        NoBrowser: There is none to draw it.
+    """
+    path = Path(path)
+    if path.suffix not in (".png", ".gif", ".mp4"):
+        raise InvalidInput(f"films are written as .gif or .mp4, not as '{path.name}'")
+    if path.suffix == ".mp4":
+        find_encoder()
+    find_browser()
 
 
 def _writable(path: Path | str) -> Path:

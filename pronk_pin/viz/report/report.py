@@ -8,6 +8,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping
 from pathlib import Path
+from urllib.parse import urlencode
 
 import numpy as np
 import pandas as pd
@@ -35,6 +36,7 @@ from ...compare.report import (
     beside_note,
     beside_the_paper,
     families,
+    format_between_engines,
     limitations,
     paper_learner,
     sampled_scenarios,
@@ -45,10 +47,14 @@ from ...errors import cannot_write
 from .. import figures
 from ..figure_style import save_figure
 from . import report_tables
+from .command_report import add_commands, command_figures
 from .document import Document
 
 SHOWN_SPEED = 0.3
 """Speed of the tracking figure [m/s]: the paper's."""
+
+REPLAY = "replay.html"
+"""File of the replay in a results folder."""
 
 FIGURES = "figures"
 """Folder of the figures of report.md."""
@@ -113,12 +119,18 @@ def write_report(results: Results, *, command: str = "") -> Path:
 
 def report(results: Results, *, command: str = "") -> Document:
     """The report as a document, see `write_report`."""
+    if results.experiment.commands:
+        return _of_commands(results, command)
     summary, scenarios = results.summary(), families(results.experiment.scenario_names)
     document = Document(f"Does practice beat the model? {results.experiment.robot_name.upper()}")
     tables = answer(summary)
     document.text(answer_in_words(summary, tables=tables), "verdict")
+    _watch(document, results)
     if len(scenarios) > 1:
         _all_scenarios(document, results, tables)
+    if engines := format_between_engines(results):
+        document.heading("Engines side by side", "engines")
+        document.text(engines, "code")
     for scenario in scenarios:
         _world(document, results, summary, tables[scenario], scenario)
     if results.foreign is not None:
@@ -129,6 +141,60 @@ def report(results: Results, *, command: str = "") -> Document:
     document.bullets(limitations(results))
     _provenance(document, results, command)
     return document
+
+
+def _of_commands(results: Results, command: str) -> Document:
+    """The report of commanded speeds."""
+    name = results.experiment.robot_name.upper()
+    document = Document(f"Does practice hold while the speed changes? {name}")
+    add_commands(document, results)
+    if results.foreign is not None:
+        _foreign_robot(document, results.foreign)
+    document.heading("Known limitations", "limits")
+    document.bullets(limitations(results))
+    _provenance(document, results, command)
+    return document
+
+
+def _watch(document: Document, results: Results) -> None:
+    """Links to what else is in the folder, and a still of the replay that leads to it."""
+    there = {
+        REPLAY: "watch it: the robots side by side, from just before the learning",
+        "summary.csv": "all numbers (summary.csv)",
+        "strides": "all strides (NetCDF)",
+        FIGURES: "the figures (SVG)",
+    }
+    found = {
+        words: name if "." in name else f"{name}/"
+        for name, words in there.items()
+        if name == FIGURES or (results.folder / name).exists()  # the figures are about to be
+    }
+    document.links(found)
+    if LEARNER not in results.experiment.controller_names or not _replayed(results):
+        return
+    scenario = results.experiment.scenario_names[0]
+    learned = _learned(results.all_strides(controller=LEARNER, scenario=scenario))
+    if not learned.sizes["speed"]:
+        return
+    speed = _nearest_speed(learned)
+    document.picture(
+        "still",
+        figures.still(learned, results.experiment.model, speed=speed),
+        f"Watch it: where the calf is farthest off in a stance, at {speed:g} m/s in {scenario}, "
+        f"errors of the angles drawn {figures.SPREAD:g} times as large. The picture leads to the "
+        "replay, which begins three strides before the learning.",
+        address=f"{REPLAY}#{urlencode({'scenario': scenario, 'speed': f'{speed:g}'})}",
+    )
+
+
+def _replayed(results: Results) -> bool:
+    """Whether a replay is in the folder."""
+    return (results.folder / REPLAY).exists()
+
+
+def _nearest_speed(strides: xr.Dataset) -> float:
+    """The speed of those of some strides that is nearest to the paper's [m/s]."""
+    return float(min(strides["speed"].to_numpy(), key=lambda v: abs(v - SHOWN_SPEED)))
 
 
 def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
@@ -146,10 +212,11 @@ def scenario_figures(results: Results, scenario: str) -> dict[str, Figure]:
     }
     learned = _learned(strides[LEARNER]) if LEARNER in strides else None
     if learned is not None and learned.sizes["speed"]:
-        speed = min(learned["speed"].to_numpy(), key=lambda v: abs(v - SHOWN_SPEED))
+        speed = _nearest_speed(learned)
         figures_by_name["tracking"] = figures.tracking(learned, speed=speed, seconds=(1.5, 5.0))
         figures_by_name["torques"] = figures.torque_library(learned)
-        figures_by_name["surface"] = figures.torque_surface(learned)
+        if learned.sizes["speed"] > 1:
+            figures_by_name["surface"] = figures.torque_surface(learned)
         model = figures.upright_strides(strides["model"]) if "model" in strides else None
         if model is not None and set(model["speed"].values) & set(learned["speed"].values):
             figures_by_name["difference"] = figures.learned_minus_model(learned, model)
@@ -168,6 +235,8 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
     Raises:
         FileProblem: The folder cannot be written, or the result is damaged.
     """
+    if results.experiment.commands:
+        return _written(command_figures(results), folder)
     figures_by_name = scenario_figures(results, results.experiment.scenario_names[0])
     if len(families(results.experiment.scenario_names)) > 1:
         figures_by_name |= {name: figure for name, (figure, _) in _suite_figures(results).items()}
@@ -175,6 +244,10 @@ def write_figures(results: Results, folder: Path) -> list[Path]:
         worlds = results.experiment.scenarios
         table = sampled_scenarios(results.summary(), scenario=world, worlds=worlds)
         figures_by_name[f"{world}-by-world"] = figures.by_scenario(table)
+    return _written(figures_by_name, folder)
+
+
+def _written(figures_by_name: Mapping[str, Figure], folder: Path) -> list[Path]:
     return [
         save_figure(figure, folder / f"{name}.{suffix}")
         for name, figure in figures_by_name.items()
@@ -186,8 +259,10 @@ def _all_scenarios(document: Document, results: Results, tables: Mapping[str, Ov
     """What comes out over all scenarios: a row a scenario, the heat map, and the learning."""
     document.heading("All scenarios", "scenarios")
     if any(LEARNER in table for table in tables.values()):
-        document.text("a row a scenario: peak error under learning (ILC) beside PD and the model.")
-        document.table(report_tables.by_scenario(tables))
+        document.table(
+            report_tables.by_scenario(tables),
+            caption="Peak error under learning (ILC) beside PD and the model, a row a scenario.",
+        )
     for name, (figure, caption) in _suite_figures(results, tables).items():
         document.picture(name, figure, caption)
 
@@ -245,8 +320,16 @@ def _world(
     document.heading(f'Controllers in the {where} "{scenario}"', scenario)
     if len(scenarios) > 1:
         document.text(verdict(summary, scenario=scenario, table=table))
-    document.table(report_tables.errors(table))
-    document.table(report_tables.motion(table, results.experiment))
+    if _replayed(results) and len(scenarios) > 1:
+        address = f"{REPLAY}#{urlencode({'scenario': drawn[0]})}"
+        document.links({f"watch it in {drawn[0]}": address})
+    document.table(
+        report_tables.errors(table), caption=f"Peak errors in {scenario}, a row a controller."
+    )
+    document.table(
+        report_tables.motion(table, results.experiment),
+        caption=f"What else is to be known of the controllers in {scenario}.",
+    )
     units = units_of_intervals(table)
     document.text(f"Intervals are drawn over the {units}." if units else "", "note")
     if sampled(scenario):
@@ -274,7 +357,10 @@ def _beside(document: Document, beside: pd.DataFrame, table: Overview) -> None:
     document.text(beside_note(table), "note")
     if beside.empty:
         return
-    document.table(report_tables.table_1(beside))
+    document.table(
+        report_tables.table_1(beside),
+        caption="Peak errors of this run beside those of the paper's Table I, a row a speed.",
+    )
     document.text(
         f"ILC of this run: `{paper_learner(table)}`. The last row holds means of the peaks, and "
         "the reduction of the mean (the paper prints the mean of its reductions: 75.8 % and "
@@ -302,18 +388,20 @@ def _foreign_robot(document: Document, foreign: ForeignRobot) -> None:
             ("simulated", [row.b for row in masses]),
         )
     }
-    document.table(pd.DataFrame([total], index=["total mass [kg]"]))
+    document.table(pd.DataFrame([total], index=["total mass [kg]"]), caption="The masses.")
     if parity.reason:
         document.text(f"M, h and J are not compared: {parity.reason}.")
     else:
-        document.table(report_tables.dynamics(parity))
+        document.table(report_tables.dynamics(parity), caption="The equations of motion.")
     if parity.differences:
         document.text(
             "Links and joints go by the joint that moves them. An inertia is (xx, yy, zz, xy, xz, "
             "yz) about the centre of mass, in the trunk's axes at zero joint angles.",
             "note",
         )
-        document.table(report_tables.differing(parity.differences), wrap=True)
+        document.table(
+            report_tables.differing(parity.differences), caption="What differs.", wrap=True
+        )
     actuators = sorted({str(row.b) for row in parity.rows if row.what == "actuator"} - {"motor"})
     if actuators:
         document.text(
@@ -330,7 +418,7 @@ def _sampled(document: Document, results: Results, summary: pd.DataFrame, scenar
         "What is drawn of each scenario, and the mean peaks in it in milliradians, over the robots "
         "that did not fall; in the order of the figure."
     )
-    document.table(report_tables.each_scenario(table))
+    document.table(report_tables.each_scenario(table), caption="A row a scenario.")
     if len(families(results.experiment.scenario_names)) > 1:
         return  # learning has its figures for all scenarios
     for name, (figure, caption) in _learning_figures(results).items():
@@ -359,7 +447,11 @@ def _provenance(document: Document, results: Results, command: str) -> None:
     for k, found in enumerate(made, start=1):
         if len(made) > 1:
             document.heading(f"Made with, {k} of {len(made)}", f"run-{k}", level=3)
-        document.table(pd.DataFrame.from_dict(found, orient="index", columns=[""]), left=True)
+        document.table(
+            pd.DataFrame.from_dict(found, orient="index", columns=[""]),
+            caption="What these numbers were made with.",
+            left=True,
+        )
     seeds = ", ".join(map(str, results.experiment.seeds))
     if results.foreign is not None:
         document.text(

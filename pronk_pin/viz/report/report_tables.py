@@ -151,9 +151,13 @@ def table_1(table: pd.DataFrame) -> pd.DataFrame:
         shown[column] = [number(value, form) for value in table[column]]
     names = {"ours": "this run", "paper": "paper"}
     shown.columns = pd.MultiIndex.from_tuples(
-        [(f"{joint} [rad]", names[source], name) for joint, source, name in shown.columns]
+        [
+            (f"{joint}: peak in stance [rad]", names[source], name)
+            for joint, source, name in shown.columns
+        ]
     )
     shown.index = pd.Index([s if isinstance(s, str) else f"{s:g}" for s in table.index])
+    shown.index.name = "speed [m/s]"
     return shown
 
 

@@ -7,7 +7,7 @@ Goes out: a `Scene`, or a `Menu` of scenes.
 from .gait_scenes import gait_scene, library_menu, nearest
 from .menu import Choice, Menu
 from .mesh_files import Mesh
-from .scene import CHANNELS, GHOST_COLOR, SECOND_COLOR, Color, Mark, Scene, Track
+from .scene import CHANNELS, GHOST_COLOR, SECOND_COLOR, Color, History, Mark, Scene, Track
 from .stride_scenes import result_menu
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "SECOND_COLOR",
     "Choice",
     "Color",
+    "History",
     "Mark",
     "Menu",
     "Mesh",

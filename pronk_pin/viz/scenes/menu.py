@@ -23,12 +23,15 @@ class Menu:
         options: The values of each option, as the page lists them.
         first: The choice that is shown first.
         embedded: Options, the most important one first, whose values listed here a file holds too.
+        rounds: What a file holds besides, in this order as far as it reaches: all combinations of
+            the values of a round, with the first choice's values of the other options.
     """
 
     make: Callable[[Choice], Scene]
     options: Mapping[str, Sequence[str]] = field(default_factory=dict)
     first: Choice = field(default_factory=dict)
     embedded: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    rounds: Sequence[Mapping[str, Sequence[str]]] = ()
 
     def __post_init__(self) -> None:
         self.check(self.first)
@@ -68,14 +71,19 @@ class Menu:
 
     def choices(self) -> Iterator[Choice]:
         """Choices that a file embeds: the first, all values of one option, of two, and so on."""
-        yield self.first
         names = list(self.embedded)
-        for count, last in enumerate(names, start=1):
-            for values in product(*(self._values(name) for name in names[:count])):
-                if values[-1] != self.first[last]:  # the others came before
-                    yield {**self.first, **dict(zip(names[:count], values, strict=True))}
+        growing = [
+            {name: self.embedded[name] for name in names[:count]} for count in range(len(names) + 1)
+        ]
+        seen = set()
+        for values_by_name in (*growing, *self.rounds):
+            for values in product(*(self._first_first(values_by_name, n) for n in values_by_name)):
+                choice = {**self.first, **dict(zip(values_by_name, values, strict=True))}
+                key = tuple(choice.values())
+                if key not in seen:
+                    seen.add(key)
+                    yield choice
 
-    def _values(self, name: str) -> list[str]:
-        """The values of an option that a file holds, the first choice's first."""
-        first = self.first[name]
-        return [first, *(value for value in self.embedded[name] if value != first)]
+    def _first_first(self, values: Mapping[str, Sequence[str]], name: str) -> list[str]:
+        """The values of an option in a round, with the first choice's first if it is there."""
+        return sorted(values[name], key=lambda value: value != self.first[name])

@@ -9,7 +9,7 @@ that lag or lead are seen to do so; the bounce within a stride stays visible too
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..._checks import Interval, instance_of, none_or, real, sequence_of, shown, text
-from ..._typing import Array
+from ..._typing import Array, IntArray
 from ...errors import InvalidInput
 from ...robot import Robot, arrow_scale, as_numbers, as_robot
 from .meshes import Appearance, appearance
@@ -34,7 +34,7 @@ SECOND_COLOR: Color = (0.90, 0.62, 0.0)
 VIEW_WINDOW = 0.6
 """Time over which the view averages the leader's position [s]: longer than a stride."""
 
-CHANNELS = ("forces", "error", "torque")
+CHANNELS = ("forces", "error", "torque", "feedforward")
 """Channels that a track may hold beside its configurations."""
 
 
@@ -53,6 +53,23 @@ class Mark(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class History:
+    """Errors of a robot over its whole run, of which a scene may show a part.
+
+    Attributes:
+        stride: Numbers of the strides, shape (n,).
+        t: When they begin, on the clock of the track [s], shape (n,); not all are in the scene.
+        errors: Peak errors in stance [rad], shape (n,), by the name of the joint.
+        began: Number of the stride at which the learning began; None without learning.
+    """
+
+    stride: IntArray
+    t: Array
+    errors: Mapping[str, Array]
+    began: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Track:
     """A robot's motion, and how it is shown.
 
@@ -62,12 +79,15 @@ class Track:
         q: Configurations in Pinocchio's layout, shape (n, 19).
         ghost: Shown translucent and in one colour, as references are.
         color: Colour in place of the URDF's; a ghost is blue without it.
+        accent: Colour of its curves and of its entry in the legend; by default its colour.
         forces: Forces of the ground on the feet, in the world frame [N], shape (n, 4, 3); each is
             an arrow from the foot's lowest point. NaN where they are not known.
         error: Reference minus measured joint angles [rad], shape (n, 12); NaN where not known.
         torque: Torques of the motors [N m], shape (n, 12); NaN where not known.
         marks: The phases and strides, in the order of time.
         caption: A line about it for the legend.
+        feedforward: What of the torque is feedforward [N m], shape (n, 12), for the plots.
+        history: Errors over its whole run, for running numbers and the timeline.
     """
 
     name: str
@@ -80,6 +100,9 @@ class Track:
     torque: Array | None = None
     marks: Sequence[Mark] = ()
     caption: str = ""
+    accent: Color | None = None
+    feedforward: Array | None = None
+    history: History | None = None
 
     def __post_init__(self) -> None:
         for key in ("t", "q", *self.channels):
@@ -112,6 +135,7 @@ class Track:
             "forces": (n, len(robot.legs), 3),
             "error": (n, robot.nu),
             "torque": (n, robot.nu),
+            "feedforward": (n, robot.nu),
         }
         for key in ("q", *self.channels):
             shape = getattr(self, key).shape
@@ -169,6 +193,10 @@ class Scene:
         force_scale: Length of a force arrow [m/N]; by default 0.1 m for 40 N of the A1, and of
             others by their size and weight.
         force_window: Time over which the forces are means [s], for the legend; 0 if they are not.
+        slope: Slope of the ground, uphill in x where positive [rad]; motions are in its frame.
+        payload: Mass on the trunk [kg], which is drawn as a cube of steel.
+        payload_position: Where it is, in the trunk's frame [m].
+        soft: Whether the ground is softer than usual, which is drawn by its colour.
     """
 
     robot: Robot
@@ -178,6 +206,10 @@ class Scene:
     friction: float | None = None
     force_scale: float | None = None
     force_window: float = 0.0
+    slope: float = 0.0
+    payload: float = 0.0
+    payload_position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    soft: bool = False
 
     def __post_init__(self) -> None:
         as_robot(self.robot)
@@ -211,8 +243,16 @@ class Scene:
         return float(max(track.t[-1] for track in self.tracks)) - self.start
 
     def times(self, fps: float) -> Array:
-        """The instants of a film of this scene, on the tracks' clock [s], shape (frames,)."""
-        return self.start + np.arange(round(self.duration * fps) + 1) / fps
+        """The instants of a film of this scene, on the tracks' clock [s], shape (frames,).
+
+        Phases begin at instants of their own: between two frames a foot would touch down in the
+        air, and a force would act before it does.
+        """
+        regular = self.start + np.arange(round(self.duration * fps) + 1) / fps
+        begins = [mark.t for track in self.tracks for mark in track.marks]
+        inside = [t for t in begins if regular[0] < t < regular[-1]]
+        instants = np.unique(np.concatenate([regular, inside]))
+        return instants[np.diff(instants, prepend=-np.inf) > 1e-7]
 
     @cached_property
     def leader(self) -> Track:

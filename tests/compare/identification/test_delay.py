@@ -86,3 +86,28 @@ def test_intervals_hold_the_shift_and_those_of_the_others_its_uncertainty() -> N
         assert (high - low < 0.3 * np.array([t.scale for t in SYNTHETIC])).all()
     assert np.mean(inside, axis=0).min() >= 0.8
     assert np.mean(inside) >= 0.85
+
+
+def test_the_column_of_the_delay_is_how_the_residual_falls_with_it() -> None:
+    """By finite differences: where the residual is `y(d) - A(d) theta`, the row of the delay is
+    `-dr/dd`, and with all unknowns at their values the linear rows leave the same residual."""
+    rng, terms, delay = np.random.default_rng(0), 3, 2
+    delays = 0.001 * np.arange(8)
+    torque = CubicSpline(delays, rng.normal(size=(8, 2, 5, 2)))  # the torque, and one column
+    rows = Equations(rng.normal(size=(2, 5)), rng.normal(size=(2, 5, terms)), np.zeros(5, int))
+    delayed = DelayedEquations(rows, torque, of_torque=(1,), delay=delay)
+
+    def residual(value: Array) -> Array:
+        given = torque(value[delay])
+        known = rows.A[..., 0] * value[0] + given[..., 1] * value[1]
+        return np.asarray(rows.y + given[..., 0] - known)
+
+    value, step = np.array([0.3, -0.7, 0.0034]), 1e-7
+    at = delayed.at(value)
+    late, early = (residual(value + shift * np.eye(terms)[delay]) for shift in (step, -step))
+    np.testing.assert_allclose(at.A[..., delay], (early - late) / (2.0 * step), rtol=1e-6)
+    np.testing.assert_allclose(at.y - at.A @ value, residual(value), atol=1e-12)
+    given = delayed.given_delay(value[delay])
+    assert given.A.shape == (2, 5, terms - 1)
+    np.testing.assert_allclose(given.A[..., 1], torque(value[delay])[..., 1])
+    np.testing.assert_allclose(given.y, rows.y + torque(value[delay])[..., 0])

@@ -700,3 +700,25 @@ def test_the_mended_gaits_keep_within_12_mrad_at_speeds_left_out(world: Scenario
     assert identified["upright"].all()
     assert identified[["thigh", "calf"]].to_numpy().max() < 0.012
     assert identified["calf"].mean() < learned["calf"].mean()
+
+
+def test_the_weight_of_a_slope_is_what_its_world_asks_for_more(
+    robot: Robot, learned_strides: xr.Dataset
+) -> None:
+    """Inverse dynamics under the world's gravity less that under the model's, with its sign."""
+    slope, gravity = 0.1, 9.0
+    world = dataclasses.replace(COMBINED, name="hill", slope=slope, gravity=gravity)
+    strides = learned_strides.assign_attrs(scenario_parameters=world.to_json())
+    phases = next(iter(recordings(strides).values()))
+    tilted = robot.model.copy()
+    tilted.gravity.linear = gravity * np.array([-np.sin(slope), 0.0, -np.cos(slope)])
+    data, still = tilted.createData(), np.zeros(18)
+    for phase in phases:
+        found = phase_forces(robot, phase, TERMS)
+        for tick in (20, 90):
+            expected = [
+                pin.rnea(tilted, data, q, still, still)
+                - pin.rnea(robot.model, robot.data, q, still, still)
+                for q in phase.of_ticks(found.motion.q)[:, tick]
+            ]
+            np.testing.assert_allclose(found.lean[tick], np.mean(expected, axis=0), atol=1e-9)

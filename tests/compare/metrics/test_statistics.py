@@ -204,3 +204,15 @@ def test_a_control_arm_that_shows_something_is_seen() -> None:
     data = summary({"pd": np.ones((1, 3)), "ilc-zero": np.full((1, 3), 1.5)})
     data.loc[data["metric"] == "upright", "value"] *= 7.0
     assert control_arm(data) == 0.5
+
+
+def test_one_pair_alone_has_a_difference_and_a_reduction_but_no_interval() -> None:
+    found = compare_pairs(table(np.array([[0.02]])), table(np.array([[0.1]])))
+    assert found.difference.value == pytest.approx(-0.08)
+    assert found.reduction.value == pytest.approx(0.8)
+    assert found.improvement.value == 1.0
+    assert found.pairs == 1
+    assert not found.reduction.known
+    none = compare_pairs(table(np.array([[np.nan]])), table(np.array([[0.1]])))
+    assert none.pairs == 0
+    assert np.isnan(none.reduction.value)

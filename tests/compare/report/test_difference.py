@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from pronk_pin.compare import Results
 from pronk_pin.compare.metrics import COLUMNS
-from pronk_pin.compare.report.difference import changes, format_changes
+from pronk_pin.compare.report.difference import LEVEL, changes, format_changes
 from pronk_pin.compare.results.manifest import Manifest
 from pronk_pin.errors import InvalidInput
 
@@ -54,14 +55,46 @@ def test_scatter_is_no_change_and_the_same_is_no_change_at_all(before: np.ndarra
 
 
 def test_of_many_comparisons_without_a_change_hardly_any_is_named() -> None:
-    rng, named = np.random.default_rng(2), 0
-    for _ in range(20):
+    """Twelve controllers, eight times: of each run one in twenty may be a false alarm, and not, as
+    twelve tests at 5 % would have it, one in two."""
+    rng, named, unadjusted = np.random.default_rng(0), 0, 0
+    for _ in range(8):
         one, other = (
-            pd.concat([summary(rng.normal(0.03, 0.003, 14), controller=f"c{k}") for k in range(4)])
+            pd.concat([summary(rng.normal(0.03, 0.003, 9), controller=f"c{k}") for k in range(12)])
             for _ in range(2)
         )
         named += int((changes(one, other)["change"] != "").any())
-    assert named <= 4  # without the adjustment for eight rows a third of the runs would be
+        first, second = (
+            side[side["joint"] == "calf"]["value"].to_numpy().reshape(12, 9)
+            for side in (one, other)
+        )
+        pairs = second - first
+        unadjusted += int((stats.ttest_1samp(pairs, 0.0, axis=1).pvalue < LEVEL).any())
+    assert named <= 1
+    assert unadjusted >= 4  # so that there is something to adjust for
+
+
+def test_p_values_are_those_of_benjamini_and_hochberg() -> None:
+    """`p_(i) m / i`, and never less than that of a larger one; by hand, from each alone."""
+    rng = np.random.default_rng(5)
+    before, parts = rng.uniform(0.02, 0.04, 9), {}
+    for k, shift in enumerate((0.0, 0.001, 0.002, 0.006)):
+        parts[f"c{k}"] = before + shift + rng.normal(0.0, 0.002, 9)
+    tables = [
+        pd.concat([summary(values, controller=name) for name, values in side.items()])
+        for side in (dict.fromkeys(parts, before), parts)
+    ]
+    alone = {
+        name: changes(summary(before, controller=name), summary(values, controller=name))["p"].max()
+        for name, values in parts.items()
+    }  # of two rows that are the same, the adjustment changes nothing
+    rows = np.repeat(sorted(alone.values()), 2)  # calf and thigh
+    adjusted = rows * len(rows) / np.arange(1, len(rows) + 1)
+    adjusted = np.minimum.accumulate(adjusted[::-1])[::-1]
+    found = changes(*tables)["p"].sort_values().to_numpy()
+    np.testing.assert_allclose(found, np.minimum(adjusted, 1.0))
+    assert found[-1] > LEVEL > found[0]
+    assert not np.allclose(found, rows)
 
 
 def test_other_seeds_are_compared_speed_by_speed(before: np.ndarray) -> None:

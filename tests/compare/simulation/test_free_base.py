@@ -5,7 +5,14 @@ import pinocchio as pin
 import pytest
 import xarray as xr
 
-from pronk_pin.compare import Experiment, Schedule, World, build_model, load_scenario, run_cell
+from pronk_pin.compare import (
+    Experiment,
+    MujocoWorld,
+    Schedule,
+    build_model,
+    load_scenario,
+    run_cell,
+)
 from pronk_pin.compare.metrics import by_joint
 from pronk_pin.control import AttitudeEstimator, Balance
 from pronk_pin.errors import UnknownName
@@ -37,7 +44,7 @@ def last_strides(strides: xr.Dataset, name: str, joint: str) -> np.ndarray:
 
 
 def test_pose_and_velocity_of_a_free_trunk_are_in_pinocchios_layout(robot: Robot) -> None:
-    world = World(robot, load_scenario("ideal"), 1, base="free")
+    world = MujocoWorld(robot, load_scenario("ideal"), 1, base="free")
     rng = np.random.default_rng(0)
     q = robot.standing.copy()
     q[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.3, -0.2, 0.5)).coeffs()
@@ -50,7 +57,7 @@ def test_pose_and_velocity_of_a_free_trunk_are_in_pinocchios_layout(robot: Robot
 
 
 def test_a_pitching_trunk_is_a_free_one_that_does_not_roll(robot: Robot) -> None:
-    worlds = [World(robot, load_scenario("ideal"), 1, base=base) for base in BASES]
+    worlds = [MujocoWorld(robot, load_scenario("ideal"), 1, base=base) for base in BASES]
     rng = np.random.default_rng(1)
     legs = robot.standing[7:].reshape(4, 3) * np.array([0.0, 1.0, 1.0])
     rates = np.tile(rng.standard_normal((2, 1, 3)) * [0.0, 1.0, 1.0], (1, 2, 1)).reshape(1, 12)
@@ -64,7 +71,7 @@ def test_a_pitching_trunk_is_a_free_one_that_does_not_roll(robot: Robot) -> None
 
 
 def test_a_free_robot_in_the_air_keeps_its_angular_momentum(robot: Robot) -> None:
-    world = World(robot, load_scenario("ideal"), 1, base="free")
+    world = MujocoWorld(robot, load_scenario("ideal"), 1, base="free")
     world.reset(np.array([[0.0, 2.0]]), robot.standing[None, 7:], pitch=0.2)
     rng = np.random.default_rng(2)
     momenta = []

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from pronk_pin.compare import World
+from pronk_pin.compare import MujocoWorld, World
 from pronk_pin.compare.world.scenario import Scenario
 from pronk_pin.control.signals.tape import Gains, Tape
 from pronk_pin.gait import Gait, GaitProblem, bezier, load_library, optimize_gait
@@ -71,7 +71,7 @@ def play(robot: Robot, world: World, tape: Tape, early: np.ndarray | None = None
 def replay(robot: Robot, gaits: Sequence[Gait]) -> Replay:
     """Average speed and mean apex over the last strides, from a start at lift-off."""
     n, dt = len(gaits), RIGID.timestep
-    world = World(robot, RIGID, n, servo=Gains())
+    world = MujocoWorld(robot, RIGID, n, servo=Gains())
     stance, flight = tapes(gaits, "stance", dt), tapes(gaits, "flight", dt)
     start = np.array([0.0])
     states = [(g.flight.base_reference(start), g.flight.joint_reference(start)) for g in gaits]

@@ -140,10 +140,11 @@ def test_far_from_the_end_no_ticks_are_kept(log: StrideLog) -> None:
 def test_a_tick_log_holds_the_motion_and_what_the_tape_asked_for() -> None:
     log, rows, rng = TickLog(3, 50, load_robot()), np.array([0, 2]), np.random.default_rng(0)
     states = rng.normal(size=(2, 20, 28))
-    force, path = rng.normal(size=(2, 20, 4, 3)), np.zeros((2, 21, 1))
+    force, finite = rng.normal(size=(2, 20, 4, 3)), np.ones((2, 20), dtype=bool)
     joints, rates = states[..., :12], states[..., 12:24]
     pose, twist = rng.normal(size=(2, 20, 7)), rng.normal(size=(2, 20, 6))
-    motion = Motion(states[..., 24:26], states[..., 26:], joints, rates, force, path, pose, twist)
+    base, base_rate = states[..., 24:26], states[..., 26:]
+    motion = Motion(base, base_rate, joints, rates, force, finite, None, pose, twist)
     reference, feedforward = rng.normal(size=(2, 2, 25, 12))
     tape = Tape(feedforward, reference, 0.0 * reference, np.full(2, 25), begin=5)
     limit, gains = np.full(12, 20.0), Gains()
@@ -170,3 +171,39 @@ def test_the_last_ticks_of_a_phase_become_the_first_of_the_next() -> None:
     log.joints[:] = np.arange(50.0)[:, None]
     log.rewind(rows, np.array([30, 41]), 2)
     np.testing.assert_array_equal(log.joints[:, :2, 0], [[30.0, 31.0], [41.0, 42.0]])
+
+
+def test_robots_whose_parts_last_differently_are_logged_each_to_its_own_end(
+    gaits: list[Gait],
+) -> None:
+    """Both at once: what lies behind the end of the shorter part is none of it."""
+    log, both = StrideLog(gaits, duration=10.0, timestep=DT), np.arange(2)
+    lengths = {"stance": np.array([150, 120]), "flight": np.array([200, 170])}
+    record = StrideRecord.of(*np.zeros((4, 2, CONTROL_SAMPLES, 12)))
+    log.begin(both, np.ones(2), np.array([True, True]), remaining=np.array([9.0, 0.1]))
+    for part, ends in lengths.items():
+        made = TickLog(2, 400, load_robot(), turns=False)
+        t = np.arange(400.0)
+        made.base[..., 0] = 1e-3 * t
+        for row, end in enumerate(ends):
+            # It rises until the part ends, and beyond that still.
+            made.base[row, :, 1], made.joints[row] = 0.3 + 1e-4 * (row + 1) * t, 0.01 * row
+            made.joints[row, end:] = 7.0
+        (log.stance if part == "stance" else log.flight)(both, record, made, ends)
+    log.end(both, np.array([0.4, 0.3]), np.array([0.2, 0.3]), np.ones(2, bool), np.zeros(2))
+    last = lengths["flight"] - 1
+    np.testing.assert_allclose(log["apex"][:, 0], 0.3 + 1e-4 * np.array([1, 2]) * last)
+    np.testing.assert_allclose(log["stance"][:, 0], DT * lengths["stance"])
+    np.testing.assert_allclose(log["mean_speed"][:, 0], [0.5, 1.0])
+    for row, gait in enumerate(gaits):
+        ticks = min(int(lengths["stance"][row]), round(gait.stance.duration / DT))
+        s = np.arange(ticks) * DT / gait.stance.duration
+        error = gait.stance.joint_reference(np.minimum(s, 1.0))[0] - 0.01 * row
+        peak = np.abs(error).max(axis=0)
+        np.testing.assert_allclose(log["peak_error"][row, 0], peak, rtol=1e-6)
+        at_end = log["base"][row, 0, 1, -1]
+        planned = min(gait.flight.duration / DT, last[row])
+        np.testing.assert_allclose(at_end, [1e-3 * planned, 0.3 + 1e-4 * (row + 1) * planned])
+    kept = log.ticks()["tick_joints"]
+    assert np.isnan(kept[0]).all()  # far from the end of the simulation
+    assert int(np.isfinite(kept[1, -1, 0, :, 0]).sum()) == 120

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin.compare import Scenario, Schedule, Simulation, World, load_scenario
+from pronk_pin.compare import MujocoWorld, Scenario, Schedule, Simulation, World, load_scenario
 from pronk_pin.control import load_controller
 from pronk_pin.gait import Gait
 from pronk_pin.robot import Robot
@@ -37,7 +37,7 @@ def build(robot: Robot, gaits: list[Gait]) -> Build:
 def test_a_pushs_impulse_is_the_change_of_momentum(robot: Robot, ticks: int) -> None:
     """Of the whole robot, in the air; however many ticks are played at once."""
     pushed = replace(IDEAL, push_impulse=(3.0, 0.0, 1.0), push_period=0.02, push_duration=0.008)
-    world = World(robot, pushed, 1)
+    world = MujocoWorld(robot, pushed, 1)
     world.reset(np.array([[0.0, 2.0]]), robot.standing[None, 7:])
     momentum = []
     steps = 35

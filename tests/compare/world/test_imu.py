@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pronk_pin.compare import Sensors, SensorSuite, World, load_scenario
+from pronk_pin.compare import MujocoWorld, Sensors, SensorSuite, World, load_scenario
 from pronk_pin.compare.world.imu import InertialUnit
 from pronk_pin.compare.world.mismatch import NOISE
 from pronk_pin.control import AttitudeEstimator, AttitudeFilter, TrunkEstimate, attitude_angle
@@ -20,7 +20,7 @@ PITCH = -0.2
 
 def unit(robot: Robot, sensors: Sensors | None = None) -> tuple[World, Callable[[], TrunkEstimate]]:
     """Robots in the air, pitched, and what they know by their IMUs; they know the pitch."""
-    world = World(robot, load_scenario("ideal"), N, base="free")
+    world = MujocoWorld(robot, load_scenario("ideal"), N, base="free")
     world.reset(np.tile([0.0, 2.0], (N, 1)), np.tile(robot.standing[7:], (N, 1)), pitch=PITCH)
     suite = SensorSuite(sensors or Sensors(), N, np.random.default_rng(0))
     attitude = np.tile(pin.rpy.rpyToMatrix(0.0, PITCH, 0.0), (N, 1, 1))

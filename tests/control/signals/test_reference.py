@@ -42,6 +42,22 @@ def test_a_change_that_nobody_would_notice_is_not_made(gaits: list[Gait]) -> Non
     np.testing.assert_array_equal(reference.position, before)
 
 
+def test_a_change_takes_the_other_part_and_is_stretched_as_it_was_or_as_is_asked(
+    gaits: list[Gait],
+) -> None:
+    one, other = gaits[0].flight, gaits[1].flight
+    changed = Reference.of([one, one], DT, 2.0, others=[other])
+    changed.stretch(np.arange(2), 1.05 * changed.planned)
+    changed.change(np.array([0]), [other], 2.0)
+    changed.change(np.array([1]), [other], 2.0, stretched=np.array([0.95]))
+    expected = Reference.of([other, other], DT, 2.0, others=[one])
+    expected.stretch(np.arange(2), np.array([1.05, 0.95]) * other.duration)
+    np.testing.assert_allclose(changed.duration, expected.duration)
+    ticks = expected.position.shape[1]
+    np.testing.assert_allclose(changed.position[:, :ticks], expected.position)
+    np.testing.assert_array_equal(changed.ticks, expected.ticks)
+
+
 def test_a_flights_duration_follows_the_flights_within_its_limit() -> None:
     timing = FlightTiming(gain=0.5, limit=0.1)
     duration, planned = np.array([0.2, 0.21, 0.2]), np.full(3, 0.2)

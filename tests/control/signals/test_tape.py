@@ -58,3 +58,14 @@ def test_beyond_its_end_a_tape_is_held() -> None:
     for name in ("feedforward", "position", "velocity"):
         values, held = getattr(tape, name), getattr(longer, name)
         np.testing.assert_array_equal(held[:, 5:], np.repeat(values[:, -1:], 3, axis=1))
+
+
+def test_a_reference_ends_after_the_last_tick_at_which_any_joint_moves() -> None:
+    velocity = np.zeros((3, 10, 12))
+    velocity[0, :4, 2] = 1.0  # one joint stops earlier than the other
+    velocity[0, :6, 7] = -1.0
+    velocity[1, 9, 0] = 0.5  # to the end of the tape
+    velocity[2, 0, 11] = 0.5
+    tape = Tape(0.0 * velocity, 0.0 * velocity, velocity, np.full(3, 10))
+    assert tape.ticks == 10
+    assert tape.reference_end.tolist() == [6, 10, 1]

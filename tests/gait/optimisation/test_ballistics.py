@@ -56,3 +56,27 @@ def test_a_longer_flight_allows_a_higher_apex(robot: Robot) -> None:
     )
     more = robot.gravity * (0.45**2 - 0.35**2) / 8.0
     assert largest_apex(longer) - largest_apex(problem) == pytest.approx(more)
+
+
+@pytest.mark.parametrize("base", ["locked", "sagittal"])
+def test_limits_of_the_a1_are_those_of_its_legs_by_hand(robot: Robot, base: str) -> None:
+    """Thigh joints 0.1805 m before and behind the trunk's middle, two links of 0.2 m that stay bent
+    by 0.9163 rad at least, feet of 0.02 m; a trunk that pitches raises its hips and swings them."""
+    problem = gait_problem(robot, 0.0, base=base)
+    pitch = problem.pitch_limit if base == "sagittal" else 0.0
+    leg = 0.2 * np.sqrt(2.0 + 2.0 * np.cos(0.9163))
+    longest = 0.35  # s, of a flight; the shortest stance is of 0.1 s
+    lowest = 0.2 - 0.02 - pitch * 0.1805  # of a thigh joint above the feet's centres
+    sweep = 2.0 * np.sqrt(leg**2 - lowest**2) + 2.0 * pitch * 0.1805 + np.pi * 0.02
+    brake = 0.5 * 0.6 * robot.gravity * longest
+    assert largest_speed(problem) == pytest.approx(sweep / 0.1 + brake, rel=1e-4)
+    highest = leg + 0.02 + pitch * 0.1805 + robot.gravity * longest**2 / 8.0
+    # On top of that, legs that go up and down within the trunk move the centre of mass.
+    assert 0.0 < largest_apex(problem) - highest < 0.1
+
+
+def test_a_trunk_that_pitches_reaches_higher_by_what_its_hips_rise(robot: Robot) -> None:
+    level, pitching = (
+        largest_apex(gait_problem(robot, 0.0, base=base)) for base in ("locked", "sagittal")
+    )
+    assert pitching - level == pytest.approx(0.2 * 0.1805)

@@ -38,7 +38,7 @@ def test_every_constraint_has_a_unit(solution: GaitSolution) -> None:
 def test_a_violation_is_found_under_its_name(robot: Robot, solution: GaitSolution) -> None:
     problem = GaitProblem(robot, 0.0, apex=1.0)
     program, p = transcribe(problem), np.array([0.3, 0.34])
-    values = program.unpack(solution.state.x)
+    values = program.unpack(solution.state.x.copy())  # blocks are views of it
     values["flight.tau"][5, 1] = robot.tau_max[1] + 2.0
     values["stance.q"][0, 1] += 1e-3
     found = program.violations(program.pack(values), p)

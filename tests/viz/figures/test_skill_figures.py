@@ -70,3 +70,12 @@ def test_axes_have_units(gains: pd.DataFrame, transfers: pd.DataFrame) -> None:
         assert axes.get_xlabel().endswith("[%]")
     for axes in transfers_figure(transfers).axes:
         assert axes.get_xlabel().endswith("[rad]")
+
+
+def test_panels_say_which_joint_they_show(gains: pd.DataFrame, transfers: pd.DataFrame) -> None:
+    for figure, columns in ((gains_figure(gains), gains), (transfers_figure(transfers), transfers)):
+        for axes in figure.axes:
+            drawn = np.concatenate([np.ravel(line.get_data()) for line in axes.lines])
+            for value in columns[axes.get_title()]:
+                assert np.isclose(drawn.astype(float), value).any()
+        assert [axes.get_title() for axes in figure.axes] == ["calf", "thigh"]

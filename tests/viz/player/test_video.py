@@ -15,10 +15,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pronk_pin.cli import main
 from pronk_pin.errors import FileProblem, InvalidInput, NoBrowser
 from pronk_pin.robot import ROBOTS, Robot, RobotSpec, load_robot
 from pronk_pin.viz import Film, Scene, Track, write_film, write_png
+from pronk_pin.viz.player import video
 from pronk_pin.viz.player.browser import VARIABLE
+from pronk_pin.viz.player.video import find_encoder
 
 if TYPE_CHECKING:
     from conftest import Eye
@@ -104,9 +107,18 @@ def test_an_animation_and_a_video_have_the_frames_asked_for(
     with Image.open(gif) as animation:
         assert (animation.n_frames, animation.size) == (8, (240, 180))
         assert animation.info["duration"] == 50
-    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    try:
+        program = find_encoder()
+    except InvalidInput as error:
+        pytest.skip(str(error))
     mp4 = write_film(scene, tmp_path / "hop.mp4", film, progress=False)
-    assert ffmpeg.count_frames_and_secs(str(mp4)) == (8, pytest.approx(0.4))
+    command = [program, "-i", str(mp4), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    frames = subprocess.run(command, capture_output=True, check=True)
+    pictures = np.frombuffer(frames.stdout, np.uint8).reshape(-1, 180, 240, 3).astype(int)
+    assert len(pictures) == 8
+    assert b"20 fps" in frames.stderr
+    first = np.asarray(Image.open(write_png(scene, tmp_path / "a.png", film)).convert("RGB"))
+    assert np.abs(pictures[0] - first).mean() < 4.0  # what is seen is what was drawn
 
 
 @pytest.mark.browser
@@ -153,12 +165,44 @@ def test_a_browser_that_ends_at_once_is_told(
         write_png(scene, tmp_path / "a.png")
 
 
-def test_without_an_encoder_it_says_what_to_install(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_without_an_encoder_it_says_what_to_install_before_anything_is_drawn(
+    scene: Scene,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(InvalidInput, match=r"pip install pronk-pin\[video\]', or write a .gif"):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InvalidInput, match=r"apt install ffmpeg.*pronk-pin\[video\].*a .gif"):
         write_film(scene, tmp_path / "a.mp4")
+    # The folder is not even read: that it is none would be told, too.
+    assert main(["view", str(tmp_path / "none"), "--mp4", str(tmp_path / "a.mp4")]) == 1
+    assert "videos are encoded by ffmpeg" in capsys.readouterr().err
+
+
+def test_without_a_browser_it_says_so_before_the_page_is_made(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(VARIABLE, "no-such-browser")
+    monkeypatch.setattr(video, "write_replay", lambda *_, **__: pytest.fail("drawn for nothing"))
+    with pytest.raises(NoBrowser, match="PRONK_PIN_BROWSER=no-such-browser is no program"):
+        write_film(scene, tmp_path / "a.gif")
+
+
+def test_an_installed_ffmpeg_is_used_before_an_extra_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """One that fails is quoted, with the way out."""
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    program = tmp_path / "ffmpeg"
+    program.write_text("#!/bin/sh\necho Unknown encoder libx264 >&2\nexit 1\n")
+    program.chmod(0o755)
+    assert find_encoder() == str(program)
+    pictures = iter([Image.new("RGB", (240, 180))] * 50)
+    with pytest.raises(InvalidInput, match=r"Unknown encoder libx264.*write a .gif"):
+        video._write_mp4(tmp_path / "a.mp4", pictures, Film(width=240, height=180))
+    assert not (tmp_path / "a.mp4").exists()
 
 
 def test_a_path_is_looked_at_before_anything_is_drawn(scene: Scene, tmp_path: Path) -> None:

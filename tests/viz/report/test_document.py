@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
 from pronk_pin.viz.report.document import Document, markdown_text, slug
+
+if TYPE_CHECKING:
+    from conftest import Eye
 
 
 def some_document() -> Document:
@@ -125,3 +131,78 @@ def test_names_from_outside_are_words_on_the_page(text: str) -> None:
 )
 def test_a_line_begins_as_words_do(text: str, line: str) -> None:
     assert markdown_text(text) == line
+
+
+def test_heads_stand_over_their_columns_and_say_what_they_are_of() -> None:
+    columns = pd.MultiIndex.from_product([["calf", "thigh"], ["ours", "paper"], ["PD", "ILC"]])
+    cells = pd.DataFrame([list("12345678")], index=pd.Index(["0.3"], name="speed"), columns=columns)
+    document = Document("Heads")
+    document.table(cells, caption="A row a speed.")
+    text = document.to_html()
+    assert "<caption>A row a speed.</caption>" in text
+    heads = [
+        [
+            (int(span or 1), name)
+            for span, name in re.findall(r'(?:colspan="(\d)")?>([^<]+)</th>', row)
+        ]
+        for row in re.findall(r"<tr>(.*?)</tr>", text.split("<thead>")[1].split("</thead>")[0])
+    ]
+    assert heads[0] == [(1, "speed"), (4, "calf"), (4, "thigh")]
+    assert heads[1] == [(2, "ours"), (2, "paper")] * 2
+    assert heads[2] == [(1, "PD"), (1, "ILC")] * 4
+    assert '<th scope="row">0.3</th><td>1</td>' in text
+    markdown = document.to_markdown("figures")
+    assert "A row a speed.\n\n| speed | calf ours PD |" in markdown
+
+
+def test_links_and_pictures_lead_to_files_beside_the_document() -> None:
+    document = Document("Links")
+    document.links({"watch it": "replay.html#speed=0.3&t=1", "numbers": "summary.csv"})
+    document.links({})
+    document.picture("still", Figure(figsize=(1, 1)), "A still", address="replay.html")
+    text = document.to_html()
+    assert '<a href="replay.html#speed=0.3&amp;t=1">watch it</a>' in text
+    assert re.search(r'<a href="replay.html"><img alt="A still" src="data:image', text)
+    assert text.count("<p>") == 1
+    markdown = document.to_markdown("figures")
+    assert "[watch it](replay.html#speed=0.3&t=1) · [numbers](summary.csv)" in markdown
+    assert "[![A still](figures/still.svg)](replay.html)" in markdown
+
+
+@pytest.mark.browser
+def test_on_paper_no_table_is_cut_off_and_in_the_dark_letters_are_light(
+    browser: Eye, tmp_path: Path
+) -> None:
+    """Fifteen columns, as the widest table of the report has them, within the margins of A4."""
+    names = ["knows", "better than model (calf/thigh)", "cost of transport (robots at 0.1 m/s)"]
+    names += [f"thigh: felt peak {k} [rad]" for k in range(12)]
+    row = ["urdf, rotors", "better/open", "1.21 (14)", *["0.0981"] * 12]
+    document = Document("Wide")
+    rows = ["PD", "PD + model", "ILC, gaits with rotors"]
+    document.table(pd.DataFrame([row] * 3, index=rows, columns=names))
+    path = tmp_path / "wide.html"
+    path.write_text(document.to_html())
+    browser.call("Page.navigate", url=path.as_uri())
+    time.sleep(0.5)
+    of = "document.querySelector"
+    beyond = f"{of}('table').scrollWidth - {of}('.table').clientWidth"
+    tall = "document.querySelector('tbody td:nth-child(5)').getClientRects()[0].height"
+    try:
+        for scheme, dark in (("light", False), ("dark", True)):
+            browser.call(
+                "Emulation.setEmulatedMedia",
+                features=[{"name": "prefers-color-scheme", "value": scheme}],
+            )
+            page = browser.look()[:, -200:].mean()
+            assert (page < 60) == dark
+        browser.call("Emulation.setEmulatedMedia", media="print")
+        a4 = round((210 - 2 * 14) / 25.4 * 96)  # px between the margins
+        size = {"width": a4, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        browser.call("Emulation.setDeviceMetricsOverride", **size)
+        assert browser.run(beyond) <= 0
+        assert browser.run("document.documentElement.scrollWidth") <= a4
+        assert browser.run(tall) < 36  # a number stands in one line
+    finally:
+        browser.call("Emulation.setEmulatedMedia", media="", features=[])
+        size = {"width": 960, "height": 700, "deviceScaleFactor": 1, "mobile": False}
+        browser.call("Emulation.setDeviceMetricsOverride", **size)

@@ -54,6 +54,22 @@ def test_the_report_answers_first_and_says_where_its_numbers_are_from(result: Re
     assert "nan" not in re.sub(r"data:image[^\"]*|provenance", "", text)
 
 
+def test_the_report_leads_to_what_is_in_its_folder(result: Results, tmp_path: Path) -> None:
+    """To the replay only where there is one, and from each scenario to its own robots."""
+    assert "replay.html" not in (result.folder / "report.html").read_text()
+    copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
+    (copy.folder / "replay.html").write_text("a replay")
+    write_report(copy)
+    text = (copy.folder / "report.html").read_text()
+    addresses = set(re.findall(r'href="([^"#]+)(?:#[^"]*)?"', text))
+    assert addresses == {"replay.html", "summary.csv", "strides/", "figures/"}
+    for address in addresses:
+        assert (copy.folder / address).exists()
+    for scenario in EXPERIMENT.scenario_names:
+        assert f'href="replay.html#scenario={scenario}"' in text
+    assert re.search(r'<a href="replay.html#[^"]+"><img', text)
+
+
 def test_the_control_arm_learns_no_torque_and_shows_what_its_timing_does(result: Results) -> None:
     """All the machinery with gain 0: before the learning it is PD to the bit, then PD timed."""
     strides = {
@@ -220,7 +236,7 @@ def test_sampled_worlds_are_one_family_and_each_has_its_line(tmp_path: Path) -> 
         speeds=(0.2,),
         controllers=("pd", "ilc", "model"),
         scenarios=names,
-        schedule=Schedule(startup=0.2, baseline=2.0, learning=2.0),
+        schedule=Schedule(startup=0.1, baseline=0.9, learning=1.3),
     )
     results = run_experiment(experiment, tmp_path / "result", workers=1, progress=False)
     write_report(results)

@@ -196,7 +196,9 @@ def test_replays_show_the_fallen_and_leave_out_what_there_is_not(
         return page.read_text()
 
     assert '"before learning"' in made(fall)
-    assert result_menu(spoiled(fall)).scene().caption.endswith("; the robot fell")
+    assert result_menu(spoiled(fall)).scene().caption.endswith("; fell: ILC")
+    alone = result_menu(spoiled(fall), beside="nothing").scene()
+    assert alone.caption.endswith("; the robot fell")
     assert "fell" not in result_menu(sound).scene().caption
     always = made(set_to(learning=1.0))  # there is nothing before the learning
     assert '"before learning"' not in always

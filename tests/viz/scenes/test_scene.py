@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pronk_pin.errors import FileProblem, InvalidInput, PartNotShown
-from pronk_pin.gait import Gait, GaitPhase
+from pronk_pin.gait import Gait, GaitPhase, load_library
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import Robot, RobotSpec, find_mesh, length_scale, load_robot
 from pronk_pin.viz import Scene, Track, gait_scene
@@ -368,3 +368,42 @@ def test_forces_and_the_camera_go_with_the_robots_size_and_weight() -> None:
     assert shown["a1"][1] == shown["bolt"][1] == 1.0
     feet = foot_positions(robot, robot.standing)[:, 0]  # of the HyQ, longer than it is high
     assert shown["hyq"][1] == pytest.approx(np.ptp(feet) / 0.45)
+
+
+def test_a_force_is_an_arrow_of_its_size_by_the_robots_size_and_weight(robot: Robot) -> None:
+    """0.1 m for 40 N of the A1; the weight of any robot is as long, over its height."""
+
+    def length(own: Robot, newtons: float) -> float:
+        scale = Scene(own, (Track("robot", np.zeros(1), own.standing[None]),)).force_scale
+        assert scale is not None
+        return scale * newtons
+
+    assert length(robot, 40.0) == pytest.approx(0.1)
+    reference = length(robot, robot.mass * robot.gravity) / length_scale(robot)
+    for name in ("go2", "solo12", "b1"):
+        own = load_robot(name)
+        weight = own.mass * own.gravity
+        assert length(own, weight) / length_scale(own) == pytest.approx(reference), name
+    track = Track("robot", np.zeros(1), robot.standing[None])
+    assert Scene(robot, (track,), force_scale=0.01).force_scale == 0.01
+
+
+def test_phases_of_a_gait_scene_are_named_as_its_feet_are_loaded(robot: Robot) -> None:
+    gait = load_library("a1").at(0.5)
+    track = gait_scene(robot, gait, strides=2).tracks[0]
+    assert track.forces is not None
+    assert track.torque is not None
+    for mark, after in zip(track.marks, track.marks[1:], strict=False):
+        inside = (track.t > mark.t + 0.01) & (track.t < after.t - 0.01)
+        load = track.forces[inside][:, :, 2].sum(axis=1)
+        assert np.all(load > 10.0) if mark.phase == "stance" else np.all(load == 0.0)
+        phase = gait.stance if mark.phase == "stance" else gait.flight
+        s = (track.t[inside] - mark.t) / phase.duration
+        motion = phase.motion(robot, s)
+        np.testing.assert_allclose(track.torque[inside], motion.tau, atol=1e-9)
+        np.testing.assert_allclose(track.forces[inside], motion.lam, atol=1e-9)
+
+
+def test_the_view_follows_a_steady_run_to_its_very_end(scene: Scene, hop: Track) -> None:
+    ends = hop.t[[0, -1]]
+    np.testing.assert_allclose(scene.view(ends)[:, 0], 0.5 * ends, atol=1e-6)

@@ -4,7 +4,12 @@
 
 const {THREE} = MeshCat;
 const GHOST_OPACITY = 0.35, TRAIL_SECONDS = 0.7, TILE = 0.5, LEAST_FORCE = 2.0;
+const STEEL = 7850;  // kg/m^3
+const PAYLOAD_COLOR = 0x8a4f7d, FIRM = 0xffffff, SOFT = 0xc9a878;
 const FORCE_COLOR = 0xd55e00, CONE_COLOR = 0x009e73, TRAIL_COLOR = 0x444444;
+const VIEWS = {reset: [0.55, 0.45, 0.85], side: [0, 0.25, 1.15], front: [1.3, 0.35, 0.001],
+               top: [0, 1.5, 0.001]};
+const short = (name) => name.split(" [")[0];  // an option without its unit, in the address
 const $ = (id) => document.getElementById(id);
 
 // --- blobs: see packing.py ------------------------------------------------------------------
@@ -89,6 +94,7 @@ class Figure {
       this.nodes.push(node);
     }
     for (const part of robot.parts) this.addPart(part);
+    if (film.payload && !track.ghost) this.nodes[1].add(payloadMesh(film));
     this.arrows = this.perLeg("forces", () => {
       const arrow = new THREE.Mesh(ARROW, new THREE.MeshLambertMaterial({color: FORCE_COLOR}));
       arrow.castShadow = true;
@@ -126,7 +132,8 @@ class Figure {
 
   addTrail() {
     const geometry = new THREE.BufferGeometry();
-    const size = Math.ceil(TRAIL_SECONDS * this.film.fps) + 2;
+    const {values: times} = this.film.times, last = times[times.length - 1] || 1;
+    const size = Math.max(44, Math.ceil(1.5 * TRAIL_SECONDS * times.length / last) + 8);
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * size), 3));
     const color = this.track.color || TRAIL_COLOR;
     const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({color}));
@@ -203,9 +210,20 @@ class Figure {
 
   remove() {
     this.group.parent.remove(this.group);
+    this.nodes[1].children.forEach((child) => child.name === "payload" && child.geometry.dispose());
     this.parts.forEach(({mesh}) => mesh.material.dispose());
     this.trails.forEach((line) => line.geometry.dispose());
   }
+}
+
+function payloadMesh(film) {
+  const side = Math.cbrt(film.payload / STEEL);
+  const material = new THREE.MeshLambertMaterial({color: PAYLOAD_COLOR});
+  const mesh = new THREE.Mesh(new THREE.BoxGeometry(side, side, side), material);
+  mesh.position.fromArray(film.payloadPosition);
+  mesh.castShadow = true;
+  mesh.name = "payload";
+  return mesh;
 }
 
 function coneMesh(friction) {
@@ -256,24 +274,74 @@ function surroundings(viewer) {
 
 // --- plots ----------------------------------------------------------------------------------
 
+// What each plot shows of a track: curves of a joint, the first solid and the second dashed.
+const PLOTS = {
+  angle: (track, joints) => track.error && [
+    (r, j) => track.q.values[r * track.q.columns + 7 + j],
+    (r, j) => track.q.values[r * track.q.columns + 7 + j] + track.error.values[r * joints + j],
+  ],
+  error: (track, joints) => track.error && [(r, j) => track.error.values[r * joints + j]],
+  torque: (track, joints) => track.torque && [
+    (r, j) => track.torque.values[r * joints + j],
+    ...(track.feedforward ? [(r, j) => track.feedforward.values[r * joints + j]] : []),
+  ],
+};
+
+const colorOf = (track) => track.accent || track.color;
+const hasForces = (track) =>
+  track.channels.includes("forces") && track.forces.values.some((value) => !Number.isNaN(value));
+
+// A robot's errors in a stride, in words.
+function errorsOf(track, stride) {
+  const {history} = track, at = history ? history.stride.indexOf(stride) : -1;
+  if (at < 0) return "";
+  const words = Object.entries(history.errors).map(([joint, errors]) =>
+    `${joint} ${errors[at] === null ? "-" : Math.round(1000 * errors[at])}`);
+  return `: ${words.join(", ")} mrad`;
+}
+
 class Plot {
   constructor(name, player) {
     this.name = name; this.player = player;
     this.canvas = $(`${name}-plot`);
     this.picture = document.createElement("canvas");
     this.canvas.addEventListener("pointerdown", (event) => this.seek(event));
-    this.canvas.addEventListener("pointermove", (event) => event.buttons && this.seek(event));
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons) this.seek(event); else this.tell(this.timeAt(event));
+    });
+    this.canvas.addEventListener("pointerleave", () => this.tell(NaN));
   }
 
-  seek(event) {
+  timeAt(event) {
     const {duration} = this.player, width = this.canvas.clientWidth;
-    this.player.seek(duration * (event.offsetX - 40) / (width - 46));
+    return Math.min(Math.max(duration * (event.offsetX - 40) / (width - 46), 0), duration);
+  }
+
+  seek(event) { this.player.seek(this.timeAt(event)); }
+
+  get tracks() {
+    const {film, robot} = this.player;
+    return film.tracks.filter((track) => !track.ghost)
+      .map((track) => [track, PLOTS[this.name](track, robot.jointNames.length)])
+      .filter(([, curves]) => curves);
+  }
+
+  // The values under the pointer, after the name of the plot.
+  tell(time) {
+    const joint = Number($("joint").value), words = $(`${this.name}-value`);
+    this.hover = time;
+    if (Number.isNaN(time) || !this.player.film) { words.textContent = ""; return; }
+    const row = Math.round(this.player.frameAt(time));
+    const values = this.tracks.map(([, curves]) =>
+      curves.map((curve) => Number(curve(row, joint).toPrecision(3))).join(" / "));
+    words.textContent = `${time.toFixed(2)} s: ${values.join("; ")}`;
+    this.player.dirty = true;
   }
 
   // Draw the curves, which stay; `mark` draws the line that moves.
   draw() {
     const {film, duration} = this.player, joint = Number($("joint").value);
-    const tracks = film.tracks.filter((track) => track[this.name] && !track.ghost);
+    const tracks = this.tracks, {values: times} = film.times;
     for (const id of ["plot", "name"]) $(`${this.name}-${id}`).hidden = !tracks.length;
     const ratio = window.devicePixelRatio, width = this.canvas.clientWidth;
     const height = this.canvas.clientHeight;
@@ -281,21 +349,25 @@ class Plot {
     for (const canvas of [this.canvas, this.picture]) {
       canvas.width = width * ratio; canvas.height = height * ratio;
     }
-    let low = 0, high = 0;
-    for (const track of tracks) {
-      const {values, rows, columns} = track[this.name];
-      for (let r = 0; r < rows; r++) {
-        const value = values[r * columns + joint];
-        if (value < low) low = value;
-        if (value > high) high = value;
+    let low = this.name === "angle" ? Infinity : 0, high = this.name === "angle" ? -Infinity : 0;
+    for (const [, curves] of tracks) {
+      for (const curve of curves) {
+        for (let r = 0; r < times.length; r++) {
+          const value = curve(r, joint);
+          if (value < low) low = value;
+          if (value > high) high = value;
+        }
       }
     }
+    if (!Number.isFinite(low)) { low = 0; high = 1; }
     const step = niceStep((high - low) / 4 || 1);
-    low = Math.floor(low / step) * step; high = Math.ceil(high / step) * step || step;
+    low = Math.floor(low / step) * step; high = Math.ceil(high / step) * step;
+    if (high <= low) high = low + step;
     const x = (t) => 40 + (width - 46) * t / duration;
     const y = (v) => 6 + (height - 26) * (high - v) / (high - low);
     const pen = this.picture.getContext("2d");
     pen.scale(ratio, ratio);
+    this.shade(pen, x, height);
     pen.font = "11px system-ui, sans-serif"; pen.fillStyle = "#555"; pen.strokeStyle = "#ddd";
     pen.textAlign = "right"; pen.textBaseline = "middle";
     for (let v = low; v < high + step / 2; v += step) {
@@ -307,14 +379,30 @@ class Plot {
     for (let t = 0; t <= duration; t += every) {
       pen.fillText(`${Number(t.toPrecision(3))} s`, x(t), height - 8);
     }
-    pen.lineWidth = 1.4;
-    for (const track of tracks) {
-      const {values, rows, columns} = track[this.name], points = [];
-      for (let r = 0; r < rows; r++) points.push([x(r / film.fps), y(values[r * columns + joint])]);
-      pen.strokeStyle = track.color || "#222";
-      line(pen, points);
+    for (const [track, curves] of [...tracks].reverse()) {  // the leader's over all others
+      pen.strokeStyle = colorOf(track) || "#222";
+      curves.forEach((curve, k) => {
+        pen.lineWidth = k ? 1 : 1.4;
+        pen.setLineDash(k ? [3, 2] : []);
+        line(pen, Array.from(times, (t, r) => [x(t), y(curve(r, joint))]));
+      });
     }
+    pen.setLineDash([]);
     this.x = x;
+  }
+
+  // Grey while the leader stands, and a line where its learning begins.
+  shade(pen, x, height) {
+    const {leader, film, duration, began} = this.player;
+    pen.fillStyle = "#eceef0";
+    leader.marks.forEach(([t, , phase], k) => {
+      const next = leader.marks[k + 1], end = next ? next[0] - film.start : duration;
+      if (phase !== "stance") return;
+      pen.fillRect(x(t - film.start), 6, x(Math.min(end, duration)) - x(t - film.start), height - 26);
+    });
+    if (!(began > 0)) return;
+    pen.strokeStyle = "#d55e00"; pen.lineWidth = 1.5;
+    line(pen, [[x(began), 0], [x(began), height - 20]]);
   }
 
   mark(time) {
@@ -325,6 +413,80 @@ class Plot {
     pen.strokeStyle = "#0072b2"; pen.lineWidth = 1.5 * window.devicePixelRatio;
     const x = this.x(time) * window.devicePixelRatio;
     line(pen, [[x, 0], [x, height - 20 * window.devicePixelRatio]]);
+  }
+}
+
+// Errors of all strides of the run, of which the film shows some: a click jumps to a stride.
+class Timeline {
+  constructor(player) { this.player = player; this.canvas = $("timeline"); }
+
+  get histories() {
+    const {film} = this.player;
+    return film ? film.tracks.filter((track) => track.history && !track.ghost) : [];
+  }
+
+  draw() {
+    const tracks = this.histories, {canvas} = this;
+    canvas.parentElement.hidden = !tracks.length;
+    const width = canvas.clientWidth, height = canvas.clientHeight, ratio = window.devicePixelRatio;
+    this.x = null;
+    if (!tracks.length || !width) return;
+    this.count = Math.max(...tracks.map(({history}) => history.stride.at(-1))) + 1;
+    canvas.width = width * ratio; canvas.height = height * ratio;
+    this.x = (stride) => width * stride / this.count;
+    this.mark();
+  }
+
+  mark() {
+    if (!this.x) return;
+    const {player, canvas} = this, tracks = this.histories, {leader} = player;
+    const ratio = window.devicePixelRatio, height = canvas.clientHeight, pen = canvas.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, canvas.clientWidth, height);
+    const numbers = leader.marks.map((entry) => entry[1]);
+    pen.fillStyle = "#dfe9f2";  // what the film shows
+    pen.fillRect(this.x(numbers[0]), 0, this.x(numbers.at(-1) + 1) - this.x(numbers[0]), height);
+    const peaks = tracks.map(({history}) => Object.values(history.errors)[0]);
+    const high = Math.max(...peaks.flat().map((value) => value || 0)) || 1;
+    [...tracks].reverse().forEach((track) => {
+      const errors = Object.values(track.history.errors)[0];
+      pen.strokeStyle = colorOf(track) || "#222"; pen.lineWidth = 1.2;
+      line(pen, track.history.stride.map((k, i) => [
+        this.x(k + 0.5), errors[i] === null ? NaN : height - 2 - (height - 4) * errors[i] / high]));
+    });
+    const {began} = leader.history || {};
+    if (began !== null && began !== undefined) {
+      pen.strokeStyle = pen.fillStyle = "#d55e00"; pen.lineWidth = 1.5;
+      line(pen, [[this.x(began), 0], [this.x(began), height]]);
+      pen.font = "11px system-ui, sans-serif"; pen.textBaseline = "top";
+      pen.fillText("learning on", this.x(began) + 4, 1);
+    }
+    const now = player.markOf(leader);
+    if (!now) return;
+    pen.strokeStyle = "#0072b2"; pen.lineWidth = 1.5;
+    line(pen, [[this.x(now[1] + 0.5), 0], [this.x(now[1] + 0.5), height]]);
+  }
+
+  strideAt(event) {
+    const at = Math.floor(this.count * event.offsetX / this.canvas.clientWidth);
+    return Math.min(Math.max(at, 0), this.count - 1);
+  }
+
+  tell(event) {
+    if (!this.x) return;
+    const k = this.strideAt(event);
+    this.canvas.title = [`stride ${k}`, ...this.histories.map((track) =>
+      track.name + errorsOf(track, k))].join("\n");
+  }
+
+  // To a stride: within the film, or in the strides that the menu has for it.
+  async jump(event) {
+    const {player} = this, k = this.strideAt(event), shows = () =>
+      player.leader.marks.find((entry) => entry[1] === k);
+    if (!shows()) await player.strides(k);
+    const mark = shows();
+    if (mark) player.seek(mark[0] - player.film.start);
+    else $("state").textContent = `Stride ${k} is not in this file: pronk-pin view shows it.`;
   }
 }
 
@@ -355,9 +517,7 @@ class Player {
     player.robot = robot;
     robot.jointNames.forEach((name, i) => $("joint").add(new Option(name, i)));
     $("joint").value = robot.shown;
-    await player.load();
-    const moment = /^#t=([0-9.]+)/.exec(location.hash);
-    if (moment) { player.pause(); player.seek(parseFloat(moment[1])); }
+    await player.obey();
     player.tick(performance.now());
     return player;
   }
@@ -370,9 +530,16 @@ class Player {
     surroundings(this.viewer);
     this.ground = groundMesh();
     this.world = new THREE.Group();
-    this.viewer.scene.add(this.ground, this.world);
+    this.earth = new THREE.Group();  // leans with the slope
+    this.earth.add(this.ground, this.world);
+    this.viewer.scene.add(this.earth);
+    const {controls} = this.viewer;
+    Object.assign(controls, {maxPolarAngle: 0.49 * Math.PI, minDistance: 0.15, maxDistance: 12});
+    controls.addEventListener("start", () => { this.moved = true; });
+    this.following = true;
     this.figures = []; this.drawn = 0; this.time = 0; this.playing = true; this.ready = false;
-    this.plots = ["error", "torque"].map((name) => new Plot(name, this));
+    this.plots = Object.keys(PLOTS).map((name) => new Plot(name, this));
+    this.timeline = new Timeline(this);
     this.controls();
   }
 
@@ -381,7 +548,7 @@ class Player {
     this.viewer.camera.aspect = width / height;
     this.viewer.camera.updateProjectionMatrix();
     this.viewer.renderer.setSize(width, height);
-    if (this.film) this.plots.forEach((plot) => plot.draw());
+    if (this.film) { this.plots.forEach((plot) => plot.draw()); this.timeline.draw(); }
     this.dirty = true;
   }
 
@@ -394,8 +561,9 @@ class Player {
       values.forEach((value) => select.add(new Option(value, value)));
       select.value = this.source.first[name];
       select.dataset.option = name;
-      select.addEventListener("change", () => this.load());
+      select.addEventListener("change", () => this.load(name));
       label.append(select);
+      label.hidden = values.length < 2;
       $("options").append(label);
     }
     $("play").addEventListener("click", () => this.playing ? this.pause() : this.play());
@@ -406,45 +574,166 @@ class Player {
       $(id).addEventListener("change", () => { this.legend(); this.dirty = true; });
     }
     document.addEventListener("keydown", (event) => {
-      if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName)) return;
-      if (event.key === " ") { event.preventDefault(); $("play").click(); }
-      if (event.key === "ArrowLeft") { this.pause(); this.seek(this.time - 0.01); }
-      if (event.key === "ArrowRight") { this.pause(); this.seek(this.time + 0.01); }
+      this.key(event);
     });
-    window.addEventListener("resize", () => this.fit());
+    // What was clicked keeps no focus: space plays, and arrows step, as before the click.
+    document.addEventListener("click", ({target, detail}) => {
+      if (detail && target.matches("input, button")) target.blur();
+    });
+    document.querySelectorAll("[data-view]").forEach((button) => {
+      button.addEventListener("click", () => this.look(button.dataset.view));
+    });
+    for (const kind of ["pointerdown", "mousedown", "touchstart"]) {  // not for turning the view
+      $("views").addEventListener(kind, (event) => event.stopPropagation());
+    }
+    $("follow").addEventListener("click", () => this.follow(!this.following));
+    $("full").addEventListener("click", () => document.fullscreenElement
+      ? document.exitFullscreen() : document.documentElement.requestFullscreen());
+    $("snap").addEventListener("click", () => this.snap());
+    $("drawer").addEventListener("click", () => {
+      const open = document.body.classList.toggle("open");
+      $("drawer").setAttribute("aria-expanded", open);
+      this.plots.forEach((plot) => plot.draw());  // they had no size
+      this.dirty = true;
+    });
+    $("timeline").addEventListener("click", (event) => this.timeline.jump(event));
+    $("timeline").addEventListener("pointermove", (event) => this.timeline.tell(event));
+    window.addEventListener("resize", () => { if (!this.moved && this.film) this.look(); this.fit(); });
+    window.addEventListener("hashchange", () => this.obey());
     this.viewer.controls.addEventListener("change", () => { this.dirty = true; });
+    this.viewer.controls.addEventListener("end", () => this.remember());
+    for (const id of ["rate", "joint", "colour"]) {
+      $(id).addEventListener("change", () => this.remember());
+    }
   }
 
+  key(event) {
+    const {key} = event, target = event.target.matches ? event.target : document.body, still = target.matches("select, input[type=text]");
+    if (still || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (key === " " && target.matches("button, input[type=checkbox]")) return;  // theirs
+    const step = {ArrowLeft: -0.01, ArrowRight: 0.01}[key];
+    const view = {r: "reset", s: "side", f: "front", t: "top"}[key];
+    if (key === " ") $("play").click();
+    else if (step) { this.pause(); this.seek(this.time + step); }
+    else if (view) this.look(view);
+    else if (key === "c") this.follow(!this.following);
+    else if (key === "p") this.snap();
+    else return;
+    event.preventDefault();
+  }
+
+  // A picture of this view, as a file.
+  snap() {
+    this.viewer.render();
+    const link = document.createElement("a");
+    link.href = this.viewer.renderer.domElement.toDataURL("image/png");
+    link.download = `${document.title.replace(/[^a-z0-9.]+/gi, "-")}-${this.time.toFixed(2)}s.png`;
+    link.click();
+  }
+
+  follow(following) {
+    this.following = following;
+    $("follow").setAttribute("aria-pressed", following);
+    this.dirty = true;
+  }
+
+  // The whole choice in the address, so that a reload or a copied link shows the same.
+  remember() {
+    if (!this.film) return;
+    const words = new URLSearchParams();
+    for (const [name, value] of Object.entries(this.shown)) words.set(short(name), value);
+    if (!this.playing) words.set("t", this.time.toFixed(3));
+    if ($("rate").value !== "1") words.set("rate", $("rate").value);
+    if ($("colour").value) words.set("colour", $("colour").value);
+    if (+$("joint").value !== this.robot.shown) words.set("joint", $("joint").value);
+    if (this.moved) {
+      const {camera, controls} = this.viewer;
+      const numbers = [...camera.position.toArray(), ...controls.target.toArray()];
+      words.set("camera", numbers.map((x) => x.toFixed(3)).join(" "));
+    }
+    history.replaceState(null, "", `#${words}`);
+  }
+
+  // Show what the address says.
+  async obey() {
+    const words = new URLSearchParams(location.hash.slice(1));
+    for (const select of this.selects) {
+      const value = words.get(short(select.dataset.option));
+      if (value !== null && [...select.options].some((option) => option.value === value)) {
+        select.value = value;
+      }
+    }
+    for (const [id, value] of [["rate", words.get("rate")], ["joint", words.get("joint")],
+                               ["colour", words.get("colour")]]) {
+      if (value !== null && [...$(id).options].some((option) => option.value === value)) {
+        $(id).value = value;
+      }
+    }
+    const camera = (words.get("camera") || "").split(" ").map(Number);
+    const stride = words.get("stride"), t = parseFloat(words.get("t"));
+    await this.load();
+    if (camera.length === 6 && camera.every(Number.isFinite)) {
+      this.viewer.camera.position.fromArray(camera);
+      this.viewer.controls.target.fromArray(camera, 3);
+      this.moved = true;
+    }
+    if (!this.film) return;
+    const mark = stride && this.leader.marks.find((entry) => String(entry[1]) === stride);
+    if (mark) this.seek(mark[0] - this.film.start);
+    if (Number.isFinite(t)) { this.pause(); this.seek(t); }
+  }
+
+  get selects() { return [...$("options").querySelectorAll("select")]; }
+
   get choice() {
-    const selects = [...$("options").querySelectorAll("select")];
-    return Object.fromEntries(selects.map((select) => [select.dataset.option, select.value]));
+    return Object.fromEntries(this.selects.map((s) => [s.dataset.option, s.value]));
+  }
+
+  set choice(choice) {
+    for (const select of this.selects) select.value = choice[select.dataset.option];
+  }
+
+  // The nearest of the choices that there are to one that keeps the option changed last.
+  held(choice, changed) {
+    const {held} = this.source;
+    if (!held) return choice;
+    const names = Object.keys(choice);
+    const alike = (values) => names.reduce((sum, name, i) =>
+      sum + (values[i] === choice[name]) * (name === changed ? 100 : 1), 0);
+    const best = held.reduce((a, b) => (alike(b) > alike(a) ? b : a));
+    return Object.fromEntries(names.map((name, i) => [name, best[i]]));
   }
 
   // Load the film that the options choose; the clock runs on, so that films can be compared.
-  async load() {
+  async load(changed) {
     const order = this.loading = (this.loading || 0) + 1;
+    const choice = this.choice = this.held(this.choice, changed);
     let film;
     try {
-      film = await unpack(await this.source.film(this.choice));
+      film = await unpack(await this.source.film(choice));
     } catch (error) {
+      if (order !== this.loading) return;
       $("state").textContent = error.message;
+      if (this.shown) this.choice = this.shown;  // menus say what the picture shows
       return;
     }
     if (order !== this.loading) return;  // another was chosen meanwhile
     $("state").textContent = "";
+    this.shown = choice;
     this.show(film);
+    this.remember();
   }
 
   show(film) {
     this.figures.forEach((figure) => figure.remove());
     const before = this.film ? this.solid : 0;
     this.film = film;
-    this.duration = (film.view.rows - 1) / film.fps;
+    this.duration = film.times.values[film.times.rows - 1];
     this.figures = film.tracks.map((track) => new Figure(this.robot, track, film, this.world));
     document.title = $("title").textContent = film.title || "pronk_pin";
     $("caption").textContent = film.caption;
     const still = this.duration === 0;
-    for (const id of ["play", "scrub", "clock", "rate"]) $(id).hidden = still;
+    for (const id of ["play", "track", "clock", "rate"]) $(id).hidden = still;
     $("scrub").max = this.duration;
     this.fillStrides();
     for (const name of ["error", "torque"]) {
@@ -457,22 +746,46 @@ class Player {
     $("arrows").parentElement.hidden = !holds("forces");
     $("cones").parentElement.hidden = !holds("forces") || !film.friction;
     $("plots").hidden = !holds("error") && !holds("torque");
+    this.earth.rotation.y = -film.slope;
+    this.ground.material.color.set(film.soft ? SOFT : FIRM);
+    this.learned();
     this.legend();
+    this.timeline.draw();  // it takes room from the pane
     if (this.solid !== before) this.look();  // the rest of the time the camera is the reader's
     this.fit();
     this.seek(this.time);
   }
 
-  // From the robots' right front; MeshCat's camera has y up.
-  look() {
-    const far = this.robot.size * (1 + 0.45 * Math.max(this.solid - 1, 0));
-    this.viewer.camera.position.set(0.55 * far, 0.45 * far, 0.85 * far);
-    this.viewer.camera.fov = 50;
-    this.viewer.controls.target.set(0, 0.2 * this.robot.size, 0);
+  // From the robots' right front; MeshCat's camera has y up. A narrow pane is seen from farther.
+  look(view = "reset") {
+    const {camera, controls} = this.viewer;
+    const narrow = Math.max(1, 1.2 * $("pane").clientHeight / ($("pane").clientWidth || 1));
+    const far = this.robot.size * (1 + 0.35 * Math.max(this.solid - 1, 0)) * narrow;
+    const [x, y, z] = VIEWS[view];
+    camera.position.set(x * far, y * far, z * far);
+    camera.fov = 50;
+    camera.updateProjectionMatrix();
+    controls.target.set(0, 0.2 * this.robot.size, 0);
+    this.moved = view !== "reset";
+    this.dirty = true;
+    if (this.ready) this.remember();
   }
 
   get solid() { return this.film.tracks.filter((track) => !track.ghost).length; }
   get leader() { return this.film.tracks.find((track) => !track.ghost) || this.film.tracks[0]; }
+
+  // When the learning begins in this film [s]: NaN if it does not.
+  get began() {
+    const {history, marks} = this.leader;
+    const mark = history && marks.find((entry) => entry[1] === history.began);
+    return mark ? mark[0] - this.film.start : NaN;
+  }
+
+  learned() {
+    const inside = this.began > 0;
+    $("began").hidden = !inside;
+    if (inside) $("began").style.left = `${100 * this.began / this.duration}%`;
+  }
 
   fillStrides() {
     const strides = new Map();
@@ -496,7 +809,7 @@ class Player {
     const ghosts = this.film.tracks.filter((track) => track.ghost);
     const solid = this.film.tracks.filter((track) => !track.ghost);
     const items = (solid.length ? solid : ghosts).map((track) => {
-      const item = entry(track.color || (trunk ? trunk.color : "#888"), track.name,
+      const item = entry(colorOf(track) || (trunk ? trunk.color : "#888"), track.name,
                          track.caption ? `: ${track.caption}` : "");
       this.words.set(track, item.children[3]);
       return item;
@@ -505,12 +818,23 @@ class Player {
       items.push(entry(ghosts[0].color, ghosts.length > 1 ? "references" : ghosts[0].name,
                        ghosts.length === 1 && ghosts[0].caption ? `: ${ghosts[0].caption}` : ""));
     }
-    if (this.film.tracks.some((track) => track.channels.includes("forces"))) {
+    if (this.film.tracks.some(hasForces)) {
       const newtons = Number((0.1 / this.film.forceScale).toPrecision(2));
       const mean = this.film.forceWindow
         ? `, mean over ${Math.round(1000 * this.film.forceWindow)} ms` : "";
       items.push(entry("#d55e00", "", `ground reaction force, 0.1 m for ${newtons} N${mean}`));
     }
+    const silent = solid.filter((track) => !hasForces(track)).map((track) => track.name);
+    if (silent.length && (this.film.forceWindow || silent.length < solid.length)) {
+      const whose = silent.length < solid.length ? ` for ${silent.join(", ")}` : "";
+      items.push(entry("transparent", "", `no forces and cones${whose}: not kept for these strides`));
+    }
+    if (this.film.payload) items.push(entry("#8a4f7d", "", `payload, ${this.film.payload} kg`));
+    if (this.film.slope) {
+      const percent = (100 * Math.tan(this.film.slope)).toFixed(1);
+      items.push(entry("transparent", "", `ground slopes by ${percent} %`));
+    }
+    if (this.film.soft) items.push(entry("#c9a878", "", "soft ground"));
     $("tracks").replaceChildren(...items);
     this.drawScale();
   }
@@ -530,12 +854,32 @@ class Player {
   }
 
   colour(by) { $("colour").value = by; this.legend(); this.dirty = true; }
-  play() { this.playing = true; $("play").textContent = "Pause"; }
-  pause() { this.playing = false; $("play").textContent = "Play"; }
+  play() { this.playing = true; this.remember(); $("play").textContent = "Pause"; }
+  pause() { this.playing = false; $("play").textContent = "Play"; this.later(); }
+
+  // Remember once the time stands still: an address is not written at each step.
+  later() {
+    clearTimeout(this.waiting);
+    this.waiting = setTimeout(() => this.remember(), 300);
+  }
 
   seek(time) {
     this.time = Math.min(Math.max(time, 0), this.duration);
     this.dirty = true;
+    if (!this.playing) this.later();
+  }
+
+  // The rows around a time, as a number between theirs: rows are not evenly spaced.
+  frameAt(time) {
+    const {values: times} = this.film.times;
+    let low = 0, high = times.length - 1;
+    if (time <= 0) return 0;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (times[middle] <= time) low = middle; else high = middle;
+    }
+    const span = times[high] - times[low];
+    return low + (span > 0 ? Math.min((time - times[low]) / span, 1) : 0);
   }
 
   // Values of a packed array at a frame, between two rows.
@@ -550,13 +894,13 @@ class Player {
   }
 
   draw() {
-    const frame = this.time * this.film.fps;
+    const frame = this.frameAt(this.time);
     const view = Player.sample(this.film.view, frame);
     this.figures.forEach((figure) => {
       const {track} = figure;
       const row = {q: Player.sample(track.q, frame), feet: Player.sample(track.feet, frame)};
       for (const channel of track.channels) row[channel] = Player.sample(track[channel], frame);
-      const past = [], first = Math.max(0, Math.ceil(frame - TRAIL_SECONDS * this.film.fps));
+      const past = [], first = Math.ceil(this.frameAt(this.time - TRAIL_SECONDS));
       for (let k = first; k <= frame; k++) past.push(Player.sample(track.feet, k));
       past.push(row.feet);
       figure.show(row, past);
@@ -566,6 +910,7 @@ class Player {
     $("clock").textContent = `${this.time.toFixed(2)} / ${this.duration.toFixed(2)} s`;
     this.status();
     this.plots.forEach((plot) => plot.mark(this.time));
+    this.timeline.mark();
   }
 
   // An instant that the stream sends: 32-bit floats, see scene_encoding.row_bytes.
@@ -587,18 +932,41 @@ class Player {
   }
 
   place(view) {
+    if (this.following || !this.stood) this.stood = [...view];
+    view = this.stood;
     this.world.position.set(-view[0], -view[1], 0);
     const wrap = (x) => -(x - 2 * TILE * Math.floor(x / (2 * TILE)));
     this.ground.position.set(wrap(view[0]), wrap(view[1]), 0);
   }
 
+  // The phase and stride in which a robot is: [t, stride, phase], or null.
+  markOf(track) {
+    const now = this.time + this.film.start + 1e-6;
+    let mark = null;
+    for (const entry of track.marks) { if (entry[0] > now) break; mark = entry; }
+    return mark;
+  }
+
+  // Load the strides with one of this number, where the menu has a window with it.
+  async strides(k) {
+    const select = this.selects.find((each) => each.dataset.option === "strides");
+    const windows = select ? [...select.options].map((option) => option.value) : [];
+    const starts = windows.filter((w) => /^from \d+ on$/.test(w)).map((w) => +w.split(" ")[1]);
+    const first = Math.max(...starts.filter((start) => start <= k));
+    const last = this.leader.history ? this.leader.history.stride.at(-1) : 0;
+    const near = k > last - 12 && windows.includes("the last ones") ? "the last ones" : null;
+    const wanted = Number.isFinite(first) ? `from ${first} on` : near;
+    if (!wanted) return;
+    select.value = wanted;
+    await this.load("strides");
+  }
+
   // Phase and stride of each robot, on the screen.
   status() {
-    const now = this.time + this.film.start + 1e-9;
     this.words.forEach((words, track) => {
-      let mark = null;
-      for (const entry of track.marks) { if (entry[0] > now) break; mark = entry; }
-      words.textContent = mark ? ` - stride ${mark[1]}, ${mark[2]}` : "";
+      const mark = this.markOf(track);
+      words.textContent = mark
+        ? ` - stride ${mark[1]}, ${mark[2]}${errorsOf(track, mark[1])}` : "";
       if (mark && track === this.leader && document.activeElement !== $("stride")) {
         for (const option of $("stride").options) {
           if (option.text === String(mark[1])) $("stride").value = option.value;

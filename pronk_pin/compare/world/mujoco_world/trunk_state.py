@@ -5,8 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from ..._typing import Array, IntArray
-from ...robot import Robot, rotation_matrix
+from ...._typing import Array, IntArray
+from ....robot import Robot, rotation_matrix
 
 
 class Trunk:

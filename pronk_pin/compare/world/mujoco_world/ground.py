@@ -7,10 +7,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.ndimage import gaussian_filter
 
-from ..._typing import Array
-from ...errors import InvalidInput
-from ...robot import Robot
-from .scenario import Scenario
+from ...._typing import Array
+from ....errors import InvalidInput
+from ....robot import Robot
+from ..scenario import Scenario
 
 _FLOOR = "floor"
 _LEVEL = 0.45

@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 from pronk_pin._typing import Array
-from pronk_pin.compare import Experiment, Scenario, World, build_model, load_scenario
-from pronk_pin.compare.world import finite, without_warnings
+from pronk_pin.compare import Experiment, MujocoWorld, Scenario, World, build_model, load_scenario
+from pronk_pin.compare.world.mujoco_world import finite, without_warnings
 from pronk_pin.control import Gains, load_controller
 from pronk_pin.dynamics import mass_matrix, nonlinear_effects
 from pronk_pin.errors import InvalidInput
@@ -104,7 +104,7 @@ def test_the_rotors_stand_on_the_diagonal_of_the_mass_matrix(robot: Robot) -> No
 
 def test_the_feet_are_where_pinocchio_has_them(robot: Robot) -> None:
     joints = robot.standing[7:] + 0.3 * np.random.default_rng(0).normal(size=12)
-    world = World(robot, IDEAL, 1)
+    world = MujocoWorld(robot, IDEAL, 1)
     world.reset(np.array([[0.2, 0.5]]), joints[None])
     q = robot.q_from_base(np.array([0.2, 0.0, 0.5]), joints)
 
@@ -137,7 +137,7 @@ def test_each_motor_accelerates_the_guided_robot_as_pinocchio_says(
     robot: Robot, torque_constant: float
 ) -> None:
     """One robot a motor; in the air, and from rest."""
-    world = World(robot, replace(IDEAL, torque_constant=torque_constant), 12)
+    world = MujocoWorld(robot, replace(IDEAL, torque_constant=torque_constant), 12)
     world.reset(np.tile([0.0, 1.0], (12, 1)), np.tile(robot.standing[7:], (12, 1)))
     world.step(4.0 * np.eye(12))
 
@@ -150,7 +150,7 @@ def test_each_motor_accelerates_the_guided_robot_as_pinocchio_says(
 
 
 def test_a_robot_in_the_air_falls_like_a_stone(robot: Robot) -> None:
-    world, steps = World(robot, IDEAL, 1), 200
+    world, steps = MujocoWorld(robot, IDEAL, 1), 200
     world.reset(np.array([[0.0, 2.0]]), robot.standing[None, 7:])
     for _ in range(steps):
         world.step(np.zeros((1, 12)))
@@ -163,7 +163,7 @@ def test_a_robot_in_the_air_falls_like_a_stone(robot: Robot) -> None:
 
 
 def test_the_ground_carries_the_weight_of_a_standing_robot(robot: Robot) -> None:
-    world = World(robot, replace(load_scenario("nominal"), payload=2.0), 1)
+    world = MujocoWorld(robot, replace(load_scenario("nominal"), payload=2.0), 1)
     stand(robot, world, robot.standing[None, 7:], 1.5)
     weight = (robot.mass + 2.0) * robot.gravity
     assert world.force[0, :, 2].sum() == pytest.approx(weight, rel=1e-3)
@@ -174,7 +174,7 @@ def test_the_ground_carries_the_weight_of_a_standing_robot(robot: Robot) -> None
 def test_a_foot_that_is_lifted_carries_nothing(robot: Robot, leg: int) -> None:
     joints = robot.standing[7:].copy()
     joints[3 * leg + 1 : 3 * leg + 3] += 0.3, -0.6
-    world = World(robot, IDEAL, 1)
+    world = MujocoWorld(robot, IDEAL, 1)
     stand(robot, world, joints[None], 0.4)
     assert ((world.force[0, :, 2] > 0.0) == (np.arange(4) != leg)).all()
 
@@ -182,7 +182,7 @@ def test_a_foot_that_is_lifted_carries_nothing(robot: Robot, leg: int) -> None:
 def test_a_softer_ground_gives_way_more(robot: Robot) -> None:
     heights = []
     for softness in (0.002, 0.01):
-        world = World(robot, replace(IDEAL, ground_time_constant=softness), 1)
+        world = MujocoWorld(robot, replace(IDEAL, ground_time_constant=softness), 1)
         stand(robot, world, robot.standing[None, 7:], 1.0)
         q = robot.q_from_base(np.insert(world.base[0], 1, 0.0), world.joints[0])
         heights.append(foot_positions(robot, q)[:, 2].mean())
@@ -271,7 +271,7 @@ def test_values_of_another_number_of_joints_are_refused_with_the_remedy(
 def test_viscous_friction_slows_the_joints_as_pinocchio_says(robot: Robot) -> None:
     """In the air; MuJoCo's Euler takes the damping at the end of the step."""
     damping, dt = 0.5, IDEAL.timestep
-    world = World(robot, replace(IDEAL, damping=damping), 1)
+    world = MujocoWorld(robot, replace(IDEAL, damping=damping), 1)
     rates = 3.0 * np.random.default_rng(1).normal(size=(1, 12))
     world.reset(np.array([[0.0, 1.0]]), robot.standing[None, 7:], joint_rates=rates)
     before = np.hstack([world.base_rate, world.joint_rates])[0]
@@ -290,7 +290,7 @@ def test_viscous_friction_slows_the_joints_as_pinocchio_says(robot: Robot) -> No
 def test_coulomb_friction_takes_its_torque_from_a_moving_joint(robot: Robot) -> None:
     """Each calf alone is driven against it; in the air, in motion."""
     coulomb, torque = 0.6, 3.0
-    worlds = [World(robot, replace(IDEAL, coulomb=value), 1) for value in (coulomb, 0.0)]
+    worlds = [MujocoWorld(robot, replace(IDEAL, coulomb=value), 1) for value in (coulomb, 0.0)]
     tau = np.zeros((1, 12))
     tau[0, 2::3] = torque
     for world, driven in zip(worlds, (tau, tau - coulomb * (tau > 0.0)), strict=True):
@@ -307,7 +307,7 @@ def test_coulomb_friction_takes_its_torque_from_a_moving_joint(robot: Robot) -> 
 def test_coulomb_friction_holds_a_joint_that_would_move_without_it(robot: Robot) -> None:
     moved = []
     for coulomb in (0.0, 0.2):
-        world = World(robot, replace(IDEAL, coulomb=coulomb), 1)
+        world = MujocoWorld(robot, replace(IDEAL, coulomb=coulomb), 1)
         world.reset(np.array([[0.0, 2.0]]), robot.standing[None, 7:])
         for _ in range(100):
             world.step(np.full((1, 12), 0.1))
@@ -323,7 +323,7 @@ def test_robots_in_a_batch_move_exactly_as_each_alone(robot: Robot) -> None:
     torques = 8.0 * rng.normal(size=(150, 3, 12))
 
     def end(rows: list[int]) -> tuple[Array, ...]:
-        world = World(robot, load_scenario("nominal"), len(rows))
+        world = MujocoWorld(robot, load_scenario("nominal"), len(rows))
         world.reset(base[rows], joints[rows])
         force = np.zeros((len(rows), 4, 3))
         for tau in torques:
@@ -339,7 +339,7 @@ def test_robots_in_a_batch_move_exactly_as_each_alone(robot: Robot) -> None:
 
 
 def test_a_robot_that_is_not_finite_is_seen_and_put_back_to_rest(robot: Robot) -> None:
-    world = World(robot, IDEAL, 2)
+    world = MujocoWorld(robot, IDEAL, 2)
     world.reset(np.tile([0.0, 1.0], (2, 1)), np.tile(robot.standing[7:], (2, 1)))
     world._state[1, 5] = np.nan
     assert finite(world.state).tolist() == [True, False]
@@ -358,7 +358,7 @@ def test_a_touchdown_is_felt_within_the_ticks_that_the_controller_reckons_with(
     robot: Robot,
 ) -> None:
     """From the instant at which the feet reach the ground, between two ticks."""
-    world, standing = World(robot, load_scenario("nominal"), 8), robot.standing[7:]
+    world, standing = MujocoWorld(robot, load_scenario("nominal"), 8), robot.standing[7:]
     heights = robot.standing[2] + np.linspace(0.05, 0.06, world.n)  # contacts at all fractions
     world.reset(np.column_stack([np.zeros(world.n), heights]), np.tile(standing, (world.n, 1)))
     clearance, load = [], []

@@ -17,12 +17,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ..._checks import path as known_path
-from ...errors import InvalidInput
-from ...parity import SIX_DIGITS, Parity, compare_models
-from ...robot import Robot, as_robot
-from ...robot.formats import check_mjcf, compile_mjcf, drop_looks, loading, read_mjcf
-from ...storage import from_text, read_bytes, sha256
+from ...._checks import path as known_path
+from ....errors import InvalidInput
+from ....parity import SIX_DIGITS, Parity, compare_models
+from ....robot import Robot, as_robot
+from ....robot.formats import check_mjcf, compile_mjcf, drop_looks, loading, read_mjcf
+from ....storage import from_text, read_bytes, sha256
 
 _FREE, _HINGE = mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_HINGE
 

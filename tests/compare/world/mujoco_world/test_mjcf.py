@@ -15,16 +15,16 @@ import pytest
 
 from pronk_pin.compare import (
     Experiment,
+    MujocoWorld,
     Results,
     Schedule,
-    World,
     build_model,
     load_scenario,
     mjcf_parity,
     mjcf_spec,
     run_experiment,
 )
-from pronk_pin.compare.world.mjcf import mjcf_sha256
+from pronk_pin.compare.world.mujoco_world.mjcf import mjcf_sha256
 from pronk_pin.errors import FileProblem, InvalidInput
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.parity import SIX_DIGITS, compare_models
@@ -126,7 +126,7 @@ def test_servos_become_motors_and_ground_and_options_are_the_scenarios(
 
 
 def test_a_robot_of_an_mjcf_stands_on_its_feet(robot: Robot, tmp_path: Path) -> None:
-    world = World(robot, replace(IDEAL, mjcf=str(mjcf(robot, tmp_path / "robot.xml"))), 1)
+    world = MujocoWorld(robot, replace(IDEAL, mjcf=str(mjcf(robot, tmp_path / "robot.xml"))), 1)
     standing = robot.standing[7:]
     world.reset(robot.standing[None, [0, 2]], standing[None])
     for _ in range(1000):
@@ -313,7 +313,7 @@ def _feet_in_bodies(robot: Robot, path: Path, *, extra: Change | None = None) ->
 
 def sensed_and_true_weight(robot: Robot, path: Path) -> tuple[float, float]:
     """What the feet feel of the robot of an MJCF after a second of standing, and what it weighs."""
-    world = World(robot, replace(IDEAL, mjcf=str(path)), 1)
+    world = MujocoWorld(robot, replace(IDEAL, mjcf=str(path)), 1)
     mass = float(world.model.body_mass.sum())
     world.reset(robot.standing[None, [0, 2]], robot.standing[None, 7:])
     for _ in range(1500):

@@ -12,6 +12,7 @@ import pytest
 from pronk_pin._typing import Array
 from pronk_pin.compare import (
     Experiment,
+    MujocoWorld,
     Scenario,
     Schedule,
     World,
@@ -20,8 +21,8 @@ from pronk_pin.compare import (
     run_cell,
     steady,
 )
-from pronk_pin.compare.world import ground
-from pronk_pin.compare.world.ground import rough_heights, steps
+from pronk_pin.compare.world.mujoco_world import ground
+from pronk_pin.compare.world.mujoco_world.ground import rough_heights, steps
 from pronk_pin.control import Gains
 from pronk_pin.errors import InvalidInput
 from pronk_pin.kinematics import foot_positions
@@ -32,7 +33,7 @@ IDEAL = load_scenario("ideal")
 
 def stiff(robot: Robot, scenario: Scenario, x: Array, seconds: float) -> World:
     """Robots that stand as rigidly as blocks, from x on; the world after so long."""
-    world, gains = World(robot, scenario, len(x)), Gains()
+    world, gains = MujocoWorld(robot, scenario, len(x)), Gains()
     standing = robot.standing[7:]
     start = np.column_stack([x, np.full(len(x), robot.standing[2])])
     world.reset(start, np.tile(standing, (len(x), 1)))

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 
-from ...robot.formats import body_inertia, set_body_inertia
-from .scenario import Scenario
+from ....robot.formats import body_inertia, set_body_inertia
+from ..scenario import Scenario
 
 
 def apply_payload(trunk: mujoco.MjsBody, scenario: Scenario) -> None:

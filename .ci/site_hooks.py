@@ -1,0 +1,21 @@
+"""What the site has otherwise than the files: the README is its first page, and links out of docs/
+lead into the repository."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
+    """Text of a page before it is rendered."""
+    source = page.file.src_uri
+    if source == "index.md":
+        markdown = (ROOT / "README.md").read_text()
+        markdown = markdown.replace("](docs/", "](").replace("](CONTRIBUTING", "](../CONTRIBUTING")
+        markdown = markdown.replace("](CITATION", "](../CITATION")
+    markdown = re.sub(r"\]\((?:\.\./)+README\.md", "](index.md", markdown)
+    return re.sub(r"\]\(\.\./(?=[A-Za-z.])", f"]({config.repo_url}/blob/main/", markdown)

@@ -1,0 +1,1 @@
+"""Tests of the package; a package itself, as some wheels (dartpy) install one named tests."""
