@@ -720,7 +720,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     ([*BUILD, "--speeds", "nan"], "speeds 'nan' is neither a number nor a range A:B:STEP"),
     ([*BUILD, "--apex", "high"], "apex 'high' is neither a number nor a range A:B:STEP"),
     ([*BUILD, "--speeds", "0", "--workers", "0"], "workers=0; give a whole number from 1 to 1024"),
-    ([*BUILD, "--gait", "gallop"], "unknown gait 'gallop'; choose one of: pronk, bound"),
+    ([*BUILD, "--gait", "gallop"], "unknown gait 'gallop'; choose one of: pronk, bound, trot"),
     ([*BUILD, "--base", "free"], "unknown base 'free'; choose one of: locked, sagittal"),
     ([*BUILD, "--output", ""], "output='.' is no file; give the name of one, as gaits.npz"),
     (["gaits", "show", "--apex", "nan"], "apex=nan; give a number that is finite"),

@@ -24,7 +24,7 @@ class Build:
     robot: str = "a1"
     """Robot: its name, or the TOML file of one of your own."""
     gait: str = "pronk"
-    """Gait style: pronk or bound."""
+    """Gait style: pronk, bound or trot."""
     base: str | None = None
     """Base mode: locked (trunk along x and z only) or sagittal (pitching too); by default the
     gait's own."""
@@ -78,7 +78,7 @@ class _OfLibrary:
     robot: str = "a1"
     """Robot whose library it is: its name, or the TOML file of one of your own."""
     gait: str = "pronk"
-    """Gait style of the shipped library: pronk or bound."""
+    """Gait style of the shipped library: pronk, bound or trot."""
     base: str | None = None
     """Base mode of the library, locked or sagittal; by default the gait's own."""
 

@@ -65,7 +65,7 @@ class View:
     robot: str = "a1"
     """Robot whose gaits are shown: its name, or the TOML file of one of your own."""
     gait: str = "pronk"
-    """Style of its shipped gaits: pronk or bound."""
+    """Style of its shipped gaits: pronk, bound or trot."""
     base: str | None = None
     """Base mode of the library, locked or sagittal; by default the gait's own."""
     port: int | None = None

@@ -25,8 +25,11 @@ def planar_rows(robot: Robot, base: Base = "locked") -> IntArray:
     """Indices of the velocities that the planar constraint leaves free: x, z, perhaps pitch, and
     the joints.
 
-    x and z are those of the trunk, which stay in the sagittal plane.
+    No constraint holds a free trunk, and all are left. x and z are those of the trunk,
+    which stay in the sagittal plane.
     """
+    if base == "free":
+        return np.arange(robot.nv, dtype=np.intp)
     free = (0, 2, 4) if base == "sagittal" else (0, 2)
     return np.array([*free, *range(NB, robot.nv)], dtype=np.intp)
 

@@ -73,7 +73,7 @@ def build_library(
         robot: The robot.
         speeds: Speeds [m/s], in any order; by default those of the gait's style.
         apexes: Greatest heights of the trunk [m], in any order; by default the style's.
-        gait: Name of the style: "pronk" or "bound".
+        gait: Name of the style: "pronk", "bound" or "trot".
         base: How the trunk may move; None for the style's own.
         path: Where to save the library; None does not save it.
         folder: Where each gait is kept as soon as it is solved, and taken from if it is there;
@@ -106,7 +106,7 @@ def build_library(
     workers = worker_count(workers)
     if path is not None:
         path = known_path("path", path)
-    parents = _outward(speeds, apexes, apex)
+    parents = _outward(speeds, apexes, apex, style.start)
     with _folder(folder) as place:
         for mesh in MESHES[:1] if "sequence" in changes else MESHES:
             tasks = {}
@@ -191,13 +191,16 @@ def _home(apexes: Sequence[float] | Array, desired: float) -> float:
 
 
 def _outward(
-    speeds: Sequence[float] | Array, apexes: Sequence[float] | Array, desired: float
+    speeds: Sequence[float] | Array,
+    apexes: Sequence[float] | Array,
+    desired: float,
+    start: float = 0.0,
 ) -> dict[Key, Key | None]:
     """Order of continuation: each gait with the neighbour that it starts from, or None.
 
     Along the speeds at the home apex, then along the heights; neighbours come first.
     """
-    rows = sorted({float(speed) + 0.0 for speed in speeds}, key=lambda v: (abs(v), v))
+    rows = sorted({float(speed) + 0.0 for speed in speeds}, key=lambda v: (abs(v - start), v))
     home = _home(apexes, desired)
     columns = sorted({float(apex) for apex in apexes}, key=lambda h: (abs(h - home), h))
     parents: dict[Key, Key | None] = {}

@@ -19,11 +19,15 @@ from .._checks import instance_of, real, sequence_of, text
 from .._display import Displayed
 from .._typing import Array
 from ..errors import InvalidInput
+from ..kinematics import free_state
 from ..robot import NB, Robot, as_numbers, as_robot
 from . import bezier
 
 ARRAYS = ("joints", "base", "tau", "lam")
 """Coefficient arrays of a phase."""
+
+PLANAR = 3
+"""Coordinates of a trunk in the sagittal plane: x, z and pitch."""
 
 _Value = TypeVar("_Value", float, Array)
 
@@ -78,6 +82,18 @@ def planar_state(
     return q, v, a
 
 
+def whole_state(
+    robot: Robot,
+    position: Sequence[Array],
+    velocity: Sequence[Array],
+    acceleration: Sequence[Array],
+) -> tuple[Array, Array, Array]:
+    """`planar_state`, or `free_state` where there are six coordinates of the trunk."""
+    planar = position[0].shape[-1] == PLANAR
+    state = planar_state if planar else free_state
+    return state(robot, position, velocity, acceleration)
+
+
 def _phases(s: Array) -> Array:
     """Phases as numbers.
 
@@ -100,7 +116,8 @@ class GaitPhase(Displayed):
         duration: How long the phase lasts [s].
         joints: Coefficients of the joint angles [rad], shape (12, order + 1): B of eq. (7).
         base: Coefficients of the trunk's x [m], z [m] and pitch [rad], shape (3, order + 1);
-            x is 0 where the stride begins.
+            x is 0 where the stride begins. On a free trunk y [m], roll and yaw [rad] follow,
+            (6, order + 1).
         tau: Coefficients of the motor torques [N m], shape (12, order + 1).
         lam: Coefficients of the contact forces in the world frame [N], shape (4, 3, order + 1).
     """
@@ -142,7 +159,10 @@ class GaitPhase(Displayed):
         return bezier.evaluate(self.joints, _phases(s), derivative=2) / self.duration**2
 
     def base_reference(self, s: Array) -> tuple[Array, Array]:
-        """Trunk x, z, pitch [m, m, rad] and their rates at the phases s, each of shape (n, 3)."""
+        """Trunk x, z, pitch [m, m, rad] and their rates at the phases s, each of shape (n, 3).
+
+        On a free trunk y, roll and yaw too: (n, 6).
+        """
         s = _phases(s)
         position = bezier.evaluate(self.base, s)
         rate = bezier.evaluate(self.base, s, derivative=1)
@@ -159,7 +179,7 @@ class GaitPhase(Displayed):
             ]
             for d in range(3)
         ]
-        q, v, a = planar_state(robot, *curves)
+        q, v, a = whole_state(robot, *curves)
         return Motion(
             t=s * self.duration,
             q=q,

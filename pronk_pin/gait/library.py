@@ -17,11 +17,11 @@ from .._checks import path as known_path
 from .._display import Displayed, spanned
 from .._typing import Array
 from ..errors import ApexOutOfRange, FileProblem, InvalidInput, SpeedOutOfRange
-from ..kinematics import Contact
+from ..kinematics import COORDINATES, Contact
 from ..robot import ROBOTS, Base, Robot, load_robot
 from ..storage import StoredArrays, read_arrays, sha256, write_arrays
 from .checks import Audit, StoredAudit
-from .gait import ARRAYS, Gait, GaitPhase
+from .gait import ARRAYS, PLANAR, Gait, GaitPhase
 from .residual import GaitResidual, gait_residual
 from .style import library_name
 
@@ -307,7 +307,7 @@ def _gaits(arrays: StoredArrays, robot: str) -> tuple[Gait, ...]:
         order = joints.shape[-1]
         parts = [
             joints,
-            arrays.numbers(f"{name}.base", n, 3, order),
+            _base(arrays, name, n, order),
             arrays.numbers(f"{name}.tau", n, joints.shape[1], order),
             arrays.numbers(f"{name}.lam", n, None, 3, order),
         ]
@@ -320,6 +320,14 @@ def _gaits(arrays: StoredArrays, robot: str) -> tuple[Gait, ...]:
         Gait(robot, float(speed), float(apex), tuple(of_gait))
         for speed, apex, of_gait in zip(speeds, apexes, phases, strict=True)
     )
+
+
+def _base(arrays: StoredArrays, name: str, n: int, order: int) -> Array:
+    """The trunk's coefficients: of x, z and pitch, or of all six coordinates of a free one."""
+    base = arrays.numbers(f"{name}.base", n, None, order)
+    if base.shape[1] not in (PLANAR, len(COORDINATES)):
+        raise arrays.damaged(f"{name} with {base.shape[1]} coordinates of the trunk")
+    return base
 
 
 class _Problem(TypedDict, total=False):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Literal
@@ -21,13 +21,18 @@ from .._checks import (
     whole,
 )
 from ..errors import InvalidInput
-from ..kinematics import CONTACTS, Contact, mirror
+from ..kinematics import CONTACTS, Contact, mirror, mirror_symmetric
 from ..robot import Base, Robot, as_robot
 
 Pair = Literal["front", "rear"]
 """A pair of legs, left and right: in a gait with mirror symmetry they do the same."""
 
 PAIRS: tuple[Pair, ...] = ("front", "rear")
+
+Place = Literal["front left", "front right", "rear left", "rear right"]
+"""A single leg, in a gait without mirror symmetry."""
+
+PLACES: tuple[Place, ...] = ("front left", "front right", "rear left", "rear right")
 
 
 _DURATION = Interval(high=10.0, unit="s")
@@ -65,14 +70,14 @@ class ContactPhase:
 
     Attributes:
         name: Its name, "stance" or "flight" in pronking.
-        stands: The pairs of legs that stand on the ground.
+        stands: The pairs of legs that stand on the ground; the single legs, on a free trunk.
         duration: How long it may last, shortest and longest [s].
         intervals: Mesh intervals.
         order: Order of the Bezier polynomials that keep it.
     """
 
     name: str
-    stands: tuple[Pair, ...]
+    stands: tuple[Pair | Place, ...]
     duration: tuple[float, float]
     intervals: int
     order: int
@@ -84,7 +89,7 @@ class ContactPhase:
         keep(self, "duration", _duration_range(self.name, self.duration))
         keep(self, "stands", sequence_of(f"{self.name}: stands", self.stands, text))
         for pair in self.stands:
-            known_name("pair of legs", pair, PAIRS)
+            known_name("leg or pair of legs", pair, (*PAIRS, *PLACES))
         for name, most in (("intervals", 1000), ("order", 60)):
             keep(
                 self, name, whole(f"{self.name}: {name}", getattr(self, name), Interval(high=most))
@@ -122,6 +127,50 @@ BOUND = (
 """Front and rear legs in turn, with a flight after each."""
 
 
+TROT = (
+    ContactPhase("left stance", ("front left", "rear right"), (0.14, 0.3), intervals=12, order=10),
+    ContactPhase("left flight", (), (0.04, 0.1), intervals=8, order=7),
+)
+"""Half a stride of a trot, named for the front leg that stands: diagonal legs, then a flight."""
+
+
+@dataclass(frozen=True)
+class FreeTrunk:
+    """What a gait without mirror symmetry asks of its trunk, which moves along and about all axes.
+
+    Attributes:
+        half_stride: The sequence is half a stride: its mirror image is the other half.
+        height: Greatest height of the trunk [m]; without it legs are nearly straight.
+        roll: Largest roll [rad].
+        yaw: Largest yaw [rad].
+        side: Largest side step of the trunk [m].
+        turn_weight: Weight of the rates of roll, pitch and yaw [1/(rad/s)^2].
+        drift_weight: Weight of the rates of y and z [1/(m/s)^2]. Without these two the solver
+            wanders in a flat valley.
+    """
+
+    half_stride: bool = False
+    height: float = 0.34
+    roll: float = 0.15
+    yaw: float = 0.15
+    side: float = 0.05
+    turn_weight: float = 10.0
+    drift_weight: float = 100.0
+
+    def __post_init__(self) -> None:
+        keep_reals(self, _OF_TRUNK)
+
+
+_OF_TRUNK = {
+    "height": Interval(0, 100, "m", above=True),
+    "roll": Interval(0, 1.5, "rad", above=True),
+    "yaw": Interval(0, 1.5, "rad", above=True),
+    "side": Interval(0, 10, "m", above=True),
+    "turn_weight": Interval(0, 1e6, "1/(rad/s)^2"),
+    "drift_weight": Interval(0, 1e6, "1/(m/s)^2"),
+}
+
+
 @dataclass(frozen=True)
 class GaitProblem:
     """A gait to be found: section II.B of the paper, for any contact sequence.
@@ -132,7 +181,7 @@ class GaitProblem:
         apex: Greatest height of the trunk [m]; its height in the middle of each flight, where a
             stride has several.
         base: "locked", the trunk moves along x and z as the paper simulates it, or "sagittal", it
-            pitches too.
+            pitches too; or "free", without mirror symmetry, with single legs in the sequence.
         sequence: The phases of a stride and the feet that stand in each; the last one ends in the
             first. Their durations are free within bounds.
         contact: A foot is a sphere that rolls without slip, or a point at the sphere's centre.
@@ -148,6 +197,7 @@ class GaitProblem:
         pitch_limit: Largest pitch of a trunk that may pitch [rad].
         trunk_height: Least height of the trunk [m].
         clearance: Height of the feet above the ground in the middle of their swing [m].
+        trunk: What is asked of a free trunk; None for the others.
     """
 
     robot: Robot = field(repr=False)
@@ -166,10 +216,12 @@ class GaitProblem:
     pitch_limit: float = 0.2
     trunk_height: float = 0.2
     clearance: float = 0.03
+    trunk: FreeTrunk | None = None
 
     def __post_init__(self) -> None:
         as_robot(self.robot)
-        known_name("base", self.base, ("locked", "sagittal"))
+        known_name("base", self.base, ("locked", "sagittal", "free"))
+        _check_trunk(self.base, self.trunk, self.sequence)
         known_name("contact", self.contact, CONTACTS)
         keep_reals(self, _NUMBERS)
         keep = object.__setattr__
@@ -183,8 +235,11 @@ class GaitProblem:
                 f"the apex, {self.apex:g} m, is not above the least trunk height, "
                 f"{self.trunk_height:g} m; raise the one or lower the other"
             )
-        _check_sequence(self.sequence, len(mirror(self.robot).pairs))
-        least, most = (sum(phase.duration[end] for phase in phases) for end in (0, 1))
+        if self.trunk is None:
+            _check_sequence(self.sequence, PAIRS[: len(mirror(self.robot).pairs)])
+        else:
+            _check_sequence(self.whole_sequence, PLACES)
+        least, most = (sum(phase.duration[end] for phase in self.whole_sequence) for end in (0, 1))
         if most < self.stride[0] or least > self.stride[1]:
             raise InvalidInput(
                 f"the phases last {least:g} to {most:g} s together, and the stride "
@@ -202,17 +257,45 @@ class GaitProblem:
         sequence = tuple(dataclasses.replace(phase, intervals=int(n)) for phase, n in phases)
         return dataclasses.replace(self, sequence=sequence)
 
+    @property
+    def half_stride(self) -> bool:
+        """Whether the sequence is half a stride, and its mirror image the other half."""
+        return self.trunk is not None and self.trunk.half_stride
+
+    @property
+    def moved(self) -> Robot:
+        """The robot whose equations of motion the gait obeys: with half a stride mirrored, one
+        that is its own mirror image."""
+        return mirror_symmetric(self.robot) if self.half_stride else self.robot
+
+    @property
+    def whole_sequence(self) -> tuple[ContactPhase, ...]:
+        """The phases of a whole stride."""
+        if not self.half_stride:
+            return self.sequence
+        return (*self.sequence, *(mirrored_phase(phase) for phase in self.sequence))
+
+    def standing(self, stands: Iterable[Pair | Place]) -> tuple[int, ...]:
+        """Indices of the folded robot's legs, of all the robot's on a free trunk."""
+        if self.base != "free":
+            return tuple(PAIRS.index(pair) for pair in stands if pair in PAIRS)
+        pairs = mirror(self.robot).pairs
+        return tuple(pairs[k // 2][k % 2] for k in map(PLACES.index, stands))
+
     def feet(self, phase: ContactPhase) -> tuple[str, ...]:
         """The robot's legs that stand in a phase, in the order of `robot.legs`."""
+        if self.base == "free":
+            return tuple(self.robot.legs[leg] for leg in sorted(self.standing(phase.stands)))
         pairs = mirror(self.robot).pairs
-        standing = [leg for pair in phase.stands for leg in pairs[PAIRS.index(pair)]]
+        standing = [leg for k in self.standing(phase.stands) for leg in pairs[k]]
         return tuple(self.robot.legs[leg] for leg in sorted(standing))
 
     def before(self, index: int) -> ContactPhase:
         """The phase before the phase of an index; the last one comes before the first."""
-        return self.sequence[index - 1]
+        last = self.sequence[index - 1]
+        return mirrored_phase(last) if self.half_stride and index == 0 else last
 
-    def landing(self, index: int) -> tuple[Pair, ...]:
+    def landing(self, index: int) -> tuple[Pair | Place, ...]:
         """The pairs whose feet touch down where the phase of an index begins."""
         before = self.before(index).stands
         return tuple(pair for pair in self.sequence[index].stands if pair not in before)
@@ -223,6 +306,9 @@ class GaitProblem:
         names = [item.name for item in dataclasses.fields(self)]
         kept = {n: getattr(self, n) for n in names if n not in ("robot", "speed", "apex")}
         kept["sequence"] = [dataclasses.asdict(phase) for phase in self.sequence]
+        del kept["trunk"]
+        if self.trunk is not None:
+            kept["trunk"] = dataclasses.asdict(self.trunk)
         return dict(json.loads(json.dumps(kept)))
 
     def fingerprint(self) -> str:
@@ -234,13 +320,19 @@ class GaitProblem:
 def _of_robot(robot: Robot, sequence: tuple[ContactPhase, ...]) -> tuple[ContactPhase, ...]:
     """The sequence without pairs of legs that the robot has not: a biped's are the front ones."""
     count = len(mirror(robot).pairs)
+    if any(place in PLACES for phase in sequence for place in phase.stands):
+        if count != len(PAIRS):
+            raise InvalidInput(
+                f"{robot.name} has {count} pairs of legs; gaits of single legs need {len(PAIRS)}"
+            )
+        return sequence
     if count > len(PAIRS):
         raise InvalidInput(
             f"{robot.name} has {count} pairs of legs; gaits are made for {len(PAIRS)} at most"
         )
     kept = []
     for phase in sequence:
-        stands = tuple(pair for pair in phase.stands if PAIRS.index(pair) < count)
+        stands = tuple(pair for pair in phase.stands if pair in PAIRS[:count])
         if phase.stands and not stands:
             raise InvalidInput(
                 f"{robot.name} has no {' and '.join(phase.stands)} legs, which {phase.name} needs; "
@@ -250,7 +342,33 @@ def _of_robot(robot: Robot, sequence: tuple[ContactPhase, ...]) -> tuple[Contact
     return tuple(kept)
 
 
-def _check_sequence(sequence: tuple[ContactPhase, ...], pairs: int) -> None:
+def mirrored_phase(phase: ContactPhase) -> ContactPhase:
+    """The same phase with left and right exchanged, in its name too."""
+    stands = tuple(PLACES[PLACES.index(place) ^ 1] for place in phase.stands)
+    left = "left" in phase.name
+    name = phase.name.replace(*(("left", "right") if left else ("right", "left")))
+    return dataclasses.replace(phase, name=name, stands=stands)
+
+
+def _check_trunk(base: Base, trunk: FreeTrunk | None, sequence: tuple[ContactPhase, ...]) -> None:
+    if trunk is not None:
+        instance_of("trunk", trunk, FreeTrunk)
+    if (base == "free") != (trunk is not None):
+        raise InvalidInput(
+            "a gait on a free trunk says what it asks of it, and others do not; choose gait "
+            "'trot', or base 'locked' or 'sagittal'"
+        )
+    legs = PAIRS if trunk is None else PLACES
+    for phase in sequence if isinstance(sequence, tuple) else ():
+        for place in getattr(phase, "stands", ()):
+            if place not in legs:
+                raise InvalidInput(
+                    f"{place} legs in {phase.name}: on base {base} a sequence says which of "
+                    f"{', '.join(legs)} stand"
+                )
+
+
+def _check_sequence(sequence: tuple[ContactPhase, ...], legs: Sequence[Pair | Place]) -> None:
     names = [phase.name for phase in sequence]
     if len(set(names)) < len(names):
         raise InvalidInput(
@@ -260,7 +378,7 @@ def _check_sequence(sequence: tuple[ContactPhase, ...], pairs: int) -> None:
         raise InvalidInput(
             "the sequence has no flight, so that no apex exists; add a phase of none"
         )
-    for pair in PAIRS[:pairs]:
+    for pair in legs:
         if not any(pair in phase.stands for phase in sequence):
             raise InvalidInput(f"the {pair} legs never stand; add them to a phase")
     for before, phase in pairwise((sequence[-1], *sequence)):

@@ -11,7 +11,7 @@ from .._checks import Interval, instance_of, known_name, whole
 from .._typing import Array
 from ..dynamics import planar_rows
 from ..kinematics import Contact, contact_jacobian, foot_positions
-from ..robot import NB, Base, Robot, as_robot
+from ..robot import BASES, NB, Base, Robot, as_robot
 from .gait import Gait, Motion
 
 
@@ -19,9 +19,9 @@ class GaitResidual(NamedTuple):
     """Largest residuals in the equations of motion (2)."""
 
     force: float
-    """Along the trunk's x and z [N]."""
+    """Along the trunk's x and z, and y where it is free [N]."""
     moment: float
-    """In the joints, and about the trunk's pitch where it is free [N m]."""
+    """In the joints, and about the trunk's axes where it is free [N m]."""
     height: float
     """Distance of the standing feet from the ground [m]."""
 
@@ -56,15 +56,16 @@ def gait_residual(
     """
     as_robot(robot)
     instance_of("gait", gait, Gait)
-    known_name("base", base, ("locked", "sagittal"))
+    known_name("base", base, BASES)
     samples = whole("samples", samples, Interval(2, 100_000))
     rows = planar_rows(robot, base)
+    forces = 3 if base == "free" else 2
     force = moment = height = 0.0
     for phase in gait.phases:
         motion = phase.motion(robot, np.linspace(0.0, 1.0, samples))
         missing = np.abs(missing_forces(robot, motion, contact)[:, rows])
-        force = max(force, float(np.max(missing[:, :2])))
-        moment = max(moment, float(np.max(missing[:, 2:])))
+        force = max(force, float(np.max(missing[:, :forces])))
+        moment = max(moment, float(np.max(missing[:, forces:])))
         if phase.feet:
             legs = [robot.legs.index(leg) for leg in phase.feet]
             above = foot_positions(robot, motion.q)[:, legs, 2] - robot.foot_radius

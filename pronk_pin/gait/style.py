@@ -20,7 +20,7 @@ from ..robot import (
     scaled_length,
     torque_scale,
 )
-from .problem import BOUND, PITCHING_PRONK, PRONK, ContactPhase, GaitProblem
+from .problem import BOUND, PITCHING_PRONK, PRONK, TROT, ContactPhase, FreeTrunk, GaitProblem
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,8 @@ class Style:
         speeds: Speeds of its library [m/s].
         apex: Greatest height of the A1's trunk in its library [m]; of others see `apex_of`.
         stride: Shortest and longest stride [s].
+        trunk: What is asked of a free trunk; None for the others.
+        start: The speed that a library begins with [m/s]: one that a crude guess leads to.
     """
 
     name: str
@@ -44,6 +46,8 @@ class Style:
     speeds: tuple[float, ...]
     apex: float
     stride: tuple[float, float]
+    trunk: FreeTrunk | None = None
+    start: float = 0.0
 
     def apex_of(self, robot: Robot) -> float:
         """Greatest height of a robot's trunk in its library [m], scaled from the A1's."""
@@ -64,6 +68,17 @@ STYLES: Mapping[str, Style] = {
     for style in (
         Style("pronk", PRONK, "locked", PITCHING_PRONK, SPEEDS, 0.34, (0.36, 0.6)),
         Style("bound", BOUND, "sagittal", BOUND, _speeds(-0.2, 0.8), 0.3, (0.3, 0.6)),
+        Style(
+            "trot",
+            TROT,
+            "free",
+            TROT,
+            _speeds(-0.4, 0.8)[::2],
+            0.31,
+            (0.36, 0.6),
+            FreeTrunk(half_stride=True),
+            0.4,
+        ),
     )
 }
 """Styles known by name."""
@@ -135,6 +150,11 @@ def gait_problem(
         **_of_size(robot),
     }
     _check_changes(changes)
+    if style.trunk is not None:
+        height = scaled_length(robot, style.trunk.height)
+        side = scaled_length(robot, style.trunk.side)
+        defaults["trunk"] = replace(style.trunk, height=height, side=side)
+        defaults["hip_limit"] = _SPLAY
     options, stands = defaults | changes, float(robot.standing[2])
     if not real("apex", options["apex"], Interval(0, 100, "m", above=True)) > stands:
         raise InvalidInput(
@@ -142,6 +162,10 @@ def gait_problem(
             + (f"more, as {apex:g} m, or none for that" if apex > stands else _HIGHER)
         )
     return GaitProblem(robot, speed, **options)
+
+
+_SPLAY = 0.15
+"""Largest hip angle on a free trunk [rad]; its feet balance it sideways."""
 
 
 def _of_size(robot: Robot) -> dict[str, float]:
@@ -175,12 +199,12 @@ def _check_changes(changes: Mapping[str, Any]) -> None:
 
 
 def known_base(base: str) -> Base:
-    """A base mode by its name.
+    """A base mode by its name, of those to choose from: a free trunk is what a style has.
 
     Raises:
         UnknownName: There is none.
     """
-    return cast(Base, known_name("base", base, get_args(Base)))
+    return cast(Base, known_name("base", base, [name for name in get_args(Base) if name != "free"]))
 
 
 _MOST = 1000

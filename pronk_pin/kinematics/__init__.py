@@ -32,10 +32,14 @@ from .legs import (
     leg_motion,
 )
 from .mirror import Mirror, mirror, mirrored
+from .symmetric import mirror_symmetric
+from .trunk import COORDINATES, MIRRORED, free_coordinates, free_rates, free_state
 from .whole_body import WholeBodySolution, inverse_kinematics
 
 __all__ = [
     "CONTACTS",
+    "COORDINATES",
+    "MIRRORED",
     "Contact",
     "LegFrames",
     "LegGeometry",
@@ -49,6 +53,9 @@ __all__ = [
     "contact_radius",
     "foot_positions",
     "foot_velocities",
+    "free_coordinates",
+    "free_rates",
+    "free_state",
     "inverse_kinematics",
     "jacobian_at",
     "leg_angle",
@@ -59,6 +66,7 @@ __all__ = [
     "leg_motion",
     "leg_odometry",
     "mirror",
+    "mirror_symmetric",
     "mirrored",
     "rotate_leg",
 ]

@@ -267,7 +267,10 @@ def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixt
         (["parity", "--seed", "-1"], "seed=-1; give a whole number from 0 on"),
         (["parity", "--tolerance", "-1"], "tolerance=-1.0; give a number from 0 on"),
         (["gaits", "build", "--speeds", "fast"], "speeds 'fast' is neither a number nor a range"),
-        (["gaits", "build", "--gait", "trot"], "unknown gait 'trot'; choose one of: pronk, bound"),
+        (
+            ["gaits", "build", "--gait", "hop"],
+            "unknown gait 'hop'; choose one of: pronk, bound",
+        ),
         (["gaits", "build", "--base", "free"], "unknown base 'free'; choose one of: locked"),
         (["gaits", "build", "--workers", "0"], "workers=0; give a whole number from 1"),
         (["gaits", "show", "0.1", "--apex", "0.5"], "which covers 0.32 to 0.36 m"),

@@ -91,7 +91,7 @@ def bezier_orders(solution: GaitSolution) -> dict[str, tuple[BezierLoss, ...]]:
 
 
 def _phases(solution: GaitSolution) -> Iterator[tuple[ContactPhase, Motion]]:
-    for phase in solution.problem.sequence:
+    for phase in solution.problem.whole_sequence:
         yield phase, solution.motions[phase.name]
 
 
@@ -120,19 +120,41 @@ def _place(phase: str, time: float) -> str:
 
 def _residual(solution: GaitSolution) -> tuple[Check, Check]:
     """Residual of eq. (2) of the whole robot: zero on the planar rows, which the planar constraint
-    leaves free; on the others the constraint's forces."""
-    robot, contact = solution.problem.robot, solution.problem.contact
+    leaves free; on the others the constraint's forces.
+
+    Nothing guides a free trunk: there the guide is what the robot lacks that is not quite the
+    mirror image of itself, where half a stride is mirrored."""
+    robot, contact = solution.problem.moved, solution.problem.contact
     rows, free, constraint = planar_rows(robot, solution.problem.base), {}, {}
     for name, motion in solution.motions.items():
         missing = missing_forces(robot, motion, contact)
         free[name] = (motion, missing[:, rows])
         constraint[name] = (motion, np.delete(missing, rows, axis=1))
+    if solution.problem.base == "free":
+        lacks = {
+            name: (motion, missing_forces(solution.problem.robot, motion, contact))
+            for name, motion in solution.motions.items()
+        }
+        return _worst("18-DoF residual", free), _worst("guide", lacks)
     return _worst("18-DoF residual", free), _worst("guide", constraint)
 
 
 def _symmetry(solution: GaitSolution) -> Check:
-    """Bilateral symmetry: distance of the right feet from the mirror image of the left ones [m]."""
-    robot = solution.problem.robot
+    """Bilateral symmetry: distance of the right feet from the mirror image of the left ones [m].
+
+    Of half a stride: distance of the feet where it ends from their mirror image where it begins,
+    the way gone between. A stride that is neither is asked for none.
+    """
+    problem, robot = solution.problem, solution.problem.robot
+    if problem.base == "free" and not problem.half_stride:
+        return Check.of("mirror symmetry", 0.0, "not asked of this gait")
+    if problem.half_stride:
+        first, last = problem.sequence[0].name, problem.sequence[-1].name
+        ends = [solution.motions[first].q[:1], solution.motions[last].q[-1:]]
+        begun, ended = (foot_positions(robot, q)[0] for q in ends)
+        image = begun[list(mirror(robot).partner)] * np.array([1.0, -1.0, 1.0])
+        image[:, 0] += problem.speed * solution.gait.duration / 2.0
+        return Check.of("mirror symmetry", float(np.max(np.abs(ended - image))), "half a stride")
     left, right = np.transpose(mirror(robot).pairs)
     by_phase = {}
     for name, motion in solution.motions.items():
@@ -148,7 +170,8 @@ def _apex(solution: GaitSolution) -> Check:
     flights, errors = [phase for phase in solution.gait.phases if not phase.feet], []
     for phase in flights:
         height = phase.base_reference(np.linspace(0.0, 1.0, 1001))[0][:, 1]
-        top = float(np.max(height) if len(flights) == 1 else height[len(height) // 2])
+        single = len(flights) == 1 and solution.problem.base != "free"
+        top = float(np.max(height) if single else height[len(height) // 2])
         errors.append((abs(top - solution.problem.apex), phase.name))
     return Check.of("apex error", *max(errors))
 
@@ -182,7 +205,7 @@ def _drifts(solution: GaitSolution) -> tuple[_PhaseDrift, _PhaseDrift]:
     problem = solution.problem
     drifts = {
         phase: drift(
-            problem.robot,
+            problem.moved,
             motion,
             contact=problem.contact,
             feet=problem.feet(phase),

@@ -18,7 +18,14 @@ from scipy.integrate import solve_ivp
 
 from ..._typing import Array
 from ...dynamics import planar_dynamics, planar_rows
-from ...kinematics import Contact, foot_positions
+from ...kinematics import (
+    COORDINATES,
+    Contact,
+    foot_positions,
+    free_coordinates,
+    free_rates,
+    free_state,
+)
 from ...robot import NB, Base, Robot
 from ..gait import Motion
 
@@ -61,6 +68,8 @@ def drift(
     """
     rows = planar_rows(robot, base)
     n = len(rows)
+    places = [k for k in range(n - robot.nu) if k in (0, 1, 3)]  # x and z, y of a free trunk
+    angles = [k for k in range(n) if k not in places]
     position = _coordinates(motion.q, n - robot.nu)  # (nodes, n)
     state = np.concatenate([position[0], motion.v[0, rows]])
     joints, moved = Worst(0.0, 0.0), Worst(0.0, 0.0)
@@ -79,7 +88,7 @@ def drift(
         )
         state = np.asarray(result.y[:, -1])
         reached, target = state[:n], position[k + 2]
-        joints = max(joints, Worst(float(np.max(np.abs(reached - target)[2:])), times[2]))
+        joints = max(joints, Worst(float(np.max(np.abs(reached - target)[angles])), times[2]))
         apart = foot_positions(robot, _configuration(robot, reached)) - foot_positions(
             robot, _configuration(robot, target)
         )
@@ -88,7 +97,10 @@ def drift(
 
 
 def _coordinates(q: Array, nb: int) -> Array:
-    """x, z, perhaps pitch, and the joints of configurations, shape (n, nb + 12)."""
+    """x, z, perhaps pitch, and the joints of configurations, shape (n, nb + 12); y, roll and yaw
+    after pitch where the trunk is free."""
+    if nb == len(COORDINATES):
+        return np.concatenate([free_coordinates(q), q[:, NB + 1 :]], axis=1)
     pitch = 2.0 * np.arctan2(q[:, 4], q[:, 6])[:, None]
     return np.concatenate([q[:, [0, 2]], pitch[:, : nb - 2], q[:, NB + 1 :]], axis=1)
 
@@ -96,6 +108,9 @@ def _coordinates(q: Array, nb: int) -> Array:
 def _rates(y: Array, n: int, nl: int) -> Array:
     """Rates of the coordinates: x and z turn from the trunk's axes into the world's."""
     rates = y[n:].copy()
+    if n - nl == len(COORDINATES):
+        rates[: n - nl] = free_rates(y[: n - nl], y[n:])
+        return rates
     if n - nl > 2:
         cos, sin = np.cos(y[2]), np.sin(y[2])
         rates[:2] = cos * y[n] + sin * y[n + 1], -sin * y[n] + cos * y[n + 1]
@@ -105,6 +120,9 @@ def _rates(y: Array, n: int, nl: int) -> Array:
 def _configuration(robot: Robot, y: Array) -> Array:
     """Configuration from the planar coordinates x, z, perhaps pitch, and the joints, (19,)."""
     nb = len(y) - robot.nu
+    if nb == len(COORDINATES):
+        still = np.zeros((1, nb)), np.zeros((1, robot.nu))
+        return np.asarray(free_state(robot, (y[None, :nb], y[None, nb:]), still, still)[0][0])
     pitch = float(y[2]) if nb > 2 else 0.0
     return robot.q_from_base(np.array([y[0], 0.0, y[1]]), y[nb:], pitch=pitch)
 

@@ -47,7 +47,7 @@ def largest_speed(problem: GaitProblem) -> float:
     turning = float(limit[0] * (leg + radius) + limit[1] * (lower + radius))
     standing = min(float(sweep) / shortest, turning)
     # Beyond its mean in stance, speed differs by what friction brakes and pushes in half a stride.
-    flying = sum(phase.duration[1] for phase in problem.sequence if not phase.stands)
+    flying = sum(phase.duration[1] for phase in problem.whole_sequence if not phase.stands)
     return standing + 0.5 * problem.friction * robot.gravity * min(flying, problem.stride[1])
 
 
@@ -101,7 +101,7 @@ def _centre_play(robot: Robot) -> float:
 
 
 def _pitch(problem: GaitProblem) -> float:
-    return problem.pitch_limit if problem.base == "sagittal" else 0.0
+    return 0.0 if problem.base == "locked" else problem.pitch_limit
 
 
 def _down(value: float) -> float:

@@ -17,15 +17,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from ..._typing import Array
+from ...kinematics import mirror
 from ...robot import JOINTS
-from ..problem import PAIRS, ContactPhase, GaitProblem
+from ..problem import ContactPhase, GaitProblem
 from .folded_model import FoldedModel, fold
+from .newton_euler import BASE_COORDINATES
 from .transcription import Constraint, Transcription, Unknown
+
+_FREE = BASE_COORDINATES["free"]
+
+_TRUNK_LIMITS = ("pitch limit", "side step", "roll limit", "yaw limit")
 
 _TIP = 1e-6
 """Rounding of the friction cone's tip [N], which keeps its derivative finite."""
@@ -69,22 +76,23 @@ def node_phases(intervals: int) -> Array:
 @lru_cache(maxsize=16)
 def transcribe(problem: GaitProblem) -> Transcription:
     """Write a gait problem as a nonlinear program with the parameters [speed, apex]."""
-    model = fold(problem.robot, problem.contact, problem.base)
+    model = fold(problem.moved, problem.contact, problem.base)
     unknowns = _unknowns(problem, model)
-    phases = [_phase(unknowns, model, phase) for phase in problem.sequence]
+    phases = [_phase(problem, unknowns, model, phase) for phase in problem.sequence]
     speed, apex = ca.SX.sym("speed"), ca.SX.sym("apex")
     constraints: list[Constraint] = []
     for phase in phases:
         constraints += _motion(model, phase)
     for phase in phases:
         constraints += _standing(problem, model, phase)
+    cycle = _cycle(problem, phases)
     for leg in range(len(model.legs)):
-        constraints += _swinging(problem, model, phases, leg)
+        constraints += _swinging(problem, model, cycle, len(phases), leg)
     flights = [phase for phase in phases if not phase.legs]
     for phase in flights:
         # With several flights the trunk pitches through them and may have no top in any.
         middle = phase.q[1, len(phase.s) // 2]
-        top = _apex(phase.s, phase.q[1, :]) if len(flights) == 1 else middle
+        top = _apex(phase.s, phase.q[1, :]) if len(flights) == 1 and model.nb < _FREE else middle
         constraints.append(Constraint("apex height", phase.name, top - apex))
     constraints += _stride(problem, phases, speed)
     for index in range(len(phases)):
@@ -103,11 +111,14 @@ def _unknowns(problem: GaitProblem, model: FoldedModel) -> dict[str, Unknown]:
     v_max = np.array([*[free] * model.nb, *problem.velocity_use * kept.v_max[joints]])
     tau_max = problem.torque_use * kept.tau_max[joints]
 
-    pitch = [problem.pitch_limit] * (model.nb - 2)
-    base_limits = ("", "trunk height", "pitch limit")[: model.nb]
+    pitch, top = [problem.pitch_limit] * (min(model.nb, 3) - 2), free
+    if problem.trunk is not None:
+        top = problem.trunk.height
+        pitch += [problem.trunk.side, problem.trunk.roll, problem.trunk.yaw]
+    base_limits = ("", "trunk height", *_TRUNK_LIMITS)[: model.nb]
     q_limits = (*base_limits, *np.where(hip, "hip limit", "configuration limits"))
     q_low = np.array([-free, problem.trunk_height, *np.negative(pitch), *low])
-    q_high = np.array([free, free, *pitch, *high])
+    q_high = np.array([free, top, *pitch, *high])
     v_limits = ("",) * model.nb + ("velocity limits",) * model.nl
     unbounded = np.full(model.nq, free)
     blocks = {
@@ -135,8 +146,13 @@ def _unknowns(problem: GaitProblem, model: FoldedModel) -> dict[str, Unknown]:
     return unknowns | impulses
 
 
-def _phase(unknowns: Mapping[str, Unknown], model: FoldedModel, phase: ContactPhase) -> _Phase:
-    name, legs = phase.name, tuple(PAIRS.index(pair) for pair in phase.stands)
+def _phase(
+    problem: GaitProblem,
+    unknowns: Mapping[str, Unknown],
+    model: FoldedModel,
+    phase: ContactPhase,
+) -> _Phase:
+    name, legs = phase.name, problem.standing(phase.stands)
     symbols = {key: unknowns[f"{name}.{key}"].symbol for key in ("q", "v", "a", "tau", "duration")}
     lam = ca.SX(3 * len(model.legs), symbols["q"].shape[1])
     for i, leg in enumerate(legs):
@@ -183,28 +199,51 @@ def _standing(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> list[C
     return constraints
 
 
+class _Part(NamedTuple):
+    """A phase of a whole stride: one of the program's, or the mirror image of one."""
+
+    phase: _Phase
+    source: tuple[int, ...]
+    """For each leg that whose unknowns move it: itself, or its partner in the mirror image."""
+
+    def stands(self, leg: int) -> bool:
+        """Whether a leg stands."""
+        return self.source[leg] in self.phase.legs
+
+
+def _cycle(problem: GaitProblem, phases: Sequence[_Phase]) -> list[_Part]:
+    """The phases of a whole stride."""
+    own = tuple(range(len(problem.robot.legs)))
+    cycle = [_Part(phase, own) for phase in phases]
+    if problem.half_stride:
+        cycle += [_Part(phase, mirror(problem.robot).partner) for phase in phases]
+    return cycle
+
+
 def _swinging(
-    problem: GaitProblem, model: FoldedModel, phases: Sequence[_Phase], leg: int
+    problem: GaitProblem, model: FoldedModel, cycle: Sequence[_Part], starts: int, leg: int
 ) -> list[Constraint]:
     """Clearance of a foot over its swings: `z >= 16 h s^2 (1 - s)^2` at the phase s of the swing.
 
-    A swing goes from lift-off to touchdown, through as many phases as it takes.
+    A swing goes from lift-off to touchdown, through as many phases as it takes. Of half a stride
+    those count that begin in it: the others are their mirror images.
     """
-    n, constraints = len(phases), []
-    for first in range(n):
-        if leg in phases[first].legs or leg not in phases[first - 1].legs:
+    n, constraints = len(cycle), []
+    for first in range(starts):
+        if cycle[first].stands(leg) or not cycle[first - 1].stands(leg):
             continue
-        length = next(i for i in range(1, n + 1) if leg in phases[(first + i) % n].legs)
-        swing = [phases[(first + i) % n] for i in range(length)]
-        total, passed = sum((phase.duration for phase in swing), ca.SX(0)), ca.SX(0)
-        for phase in swing:
-            last = len(phase.s) - 1 if phase is swing[-1] else len(phase.s)
+        length = next(i for i in range(1, n + 1) if cycle[(first + i) % n].stands(leg))
+        swing = [cycle[(first + i) % n] for i in range(length)]
+        total = sum((part.phase.duration for part in swing), ca.SX(0))
+        passed = ca.SX(0)
+        for i, (phase, source) in enumerate(swing):
+            last = len(phase.s) - 1 if i == length - 1 else len(phase.s)
             for k in range(1, last):
                 alone = length == 1
                 s = phase.s[k] if alone else (passed + phase.duration * phase.s[k]) / total
                 # Flat at both ends: a parabola would fight the feet's zero velocity at lift-off.
                 profile = problem.clearance * 16 * s**2 * (1 - s) ** 2
-                height = _feet(model, phase, k, [leg])[0] - problem.robot.foot_radius
+                height = _feet(model, phase, k, [source[leg]])[0] - problem.robot.foot_radius
                 where = f"{phase.name}, node {k}"
                 constraints.append(
                     Constraint("foot clearance", where, height - profile, upper=np.inf)
@@ -232,9 +271,10 @@ def _apex(s: Array, z: ca.SX) -> ca.SX:
 def _stride(problem: GaitProblem, phases: Sequence[_Phase], speed: ca.SX) -> list[Constraint]:
     """Constraints on the whole stride: duration, start at x = 0, `x_N - x_0 = v T`."""
     total = sum((phase.duration for phase in phases), ca.SX(0))
+    parts = 2.0 if problem.half_stride else 1.0
     first, last = phases[0].q[0, 0], phases[-1].q[0, -1]
     return [
-        Constraint("stride duration", "stride", total, *problem.stride),
+        Constraint("stride duration", "stride", parts * total, *problem.stride),
         Constraint("periodicity", "stride", first),  # x may begin anywhere; here it begins at 0
         Constraint("average speed", "stride", last - first - speed * total),
     ]
@@ -256,10 +296,13 @@ def _transition(
     name, rows = ("phase continuity", slice(0, None)) if index else ("periodicity", slice(1, None))
     where = f"{before.name} to {phase.name}"
     q, v = phase.q[:, 0], phase.v[:, 0]
-    constraints = [Constraint(name, where, before.q[rows, -1] - q[rows])]
-    landing = [PAIRS.index(pair) for pair in problem.landing(index)]
+    last_q, last_v = before.q[:, -1], before.v[:, -1]
+    if problem.half_stride and not index:
+        last_q, last_v = model.mirrored(last_q), model.mirrored(last_v)
+    constraints = [Constraint(name, where, last_q[rows] - q[rows])]
+    landing = problem.standing(problem.landing(index))
     if not landing:
-        return [*constraints, Constraint(name, where, before.v[:, -1] - v)]
+        return [*constraints, Constraint(name, where, last_v - v)]
     impulse = ca.SX(3 * len(model.legs), 1)
     for i, leg in enumerate(phase.legs):
         symbol = unknowns[f"{phase.name}.impulse"].symbol
@@ -267,7 +310,7 @@ def _transition(
     where = f"touchdown of {phase.name}"
     height = _feet(model, phase, 0, landing)[0] - problem.robot.foot_radius
     velocity = _feet(model, phase, 0, phase.legs)[1]
-    residual = model.impact(q, v - before.v[:, -1], impulse)
+    residual = model.impact(q, v - last_v, impulse)
     cone = _cone(impulse, phase.legs, problem.friction)
     return [
         *constraints,
@@ -287,12 +330,18 @@ def _cone(forces: ca.SX, legs: Sequence[int], friction: float) -> ca.SX:
 def _cost(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> ca.SX:
     """Cost (6) over a phase, `int W_tau |tau|^2 + W_q |q'|^2 dt`, by Simpson's rule.
 
-    The kept legs count twice.
+    The kept legs count twice, and so does half a stride. A free trunk's turning and its motion
+    beside the way cost a little too.
     """
-    rate = 2.0 * (
+    count = 1.0 if problem.base == "free" and not problem.half_stride else 2.0
+    rate = count * (
         problem.torque_weight * ca.sum1(phase.tau**2)
         + problem.velocity_weight * ca.sum1(phase.v[model.nb :, :] ** 2)
     )  # (1, nodes)
+    if problem.trunk is not None:
+        turns, strays = phase.v[[2, 4, 5], :], phase.v[[1, 3], :]
+        rate += count * problem.trunk.turn_weight * ca.sum1(turns**2)
+        rate += count * problem.trunk.drift_weight * ca.sum1(strays**2)
     lengths = np.diff(phase.s[::2])
     weights = np.zeros(len(phase.s))
     weights[:-1:2] += lengths / 6

@@ -12,6 +12,10 @@ lie in the mirror plane; what it lies beside it gives a roll moment, which the p
 that keeps the trunk in the plane takes. Where the URDF's left and right legs differ, the folded leg
 is their mean, which leaves the motion exact: `asymmetry` says what each side needs besides.
 
+A gait without mirror symmetry needs the whole robot on a free trunk: the same model, not folded.
+Its legs are all kept, each counts once, and the trunk's coordinates are x, z and pitch as above,
+then y, roll and yaw (18). Mirrored in the sagittal plane, the last three change their sign.
+
 Everything is a CasADi SX expression, so that the solver gets exact derivatives.
 """
 
@@ -26,12 +30,12 @@ import numpy as np
 from ..._typing import Array, BoolArray, IntArray
 from ...kinematics import Contact, mirror
 from ...robot import JOINTS, SLIDING, Base, Robot
-from .newton_euler import BASE_COORDINATES, FrameMotion, newton_euler
+from .newton_euler import BASE_COORDINATES, FrameMotion, Half, newton_euler
 
 
 @dataclass(frozen=True, eq=False)
 class FoldedModel:
-    """Dynamics and contact kinematics of the folded robot, as CasADi functions.
+    """Dynamics and contact kinematics of the folded robot, or of the whole one on a free trunk.
 
     Forces are those of one motor and of one foot, not of a pair.
 
@@ -87,6 +91,8 @@ class FoldedModel:
 
     def leg_index(self) -> IntArray:
         """For each leg of the robot, which leg of the folded robot moves it, shape (4,)."""
+        if self.base == "free":
+            return np.arange(len(self.legs), dtype=np.intp)
         kept = {leg: i for i, pair in enumerate(mirror(self.robot).pairs) for leg in pair}
         return np.array([kept[leg] for leg in range(len(self.robot.legs))], dtype=np.intp)
 
@@ -117,6 +123,12 @@ class FoldedModel:
         by_leg = folded.reshape(*folded.shape[:-1], len(self.legs), 3)
         return np.asarray(by_leg[..., self.leg_index(), :] * self.force_sign())
 
+    def mirrored(self, x: ca.SX) -> ca.SX:
+        """Mirror the coordinates of the robot on a free trunk, or their rates, (18,)."""
+        partner, sign = mirror(self.robot).partner, mirror(self.robot).sign.ravel()
+        joints = x[self.nb :][_leg_joints(np.array(partner, dtype=np.intp)).tolist()]
+        return ca.vertcat(x[:3], -x[3 : self.nb], joints * ca.DM(sign))
+
     def _right(self) -> BoolArray:
         return np.array([leg not in self.legs for leg in self.robot.legs])
 
@@ -133,21 +145,25 @@ def fold(robot: Robot, contact: Contact = "rolling", base: Base = "locked") -> F
     Raises:
         InvalidInput: The legs do not come in pairs, left and right.
     """
-    legs = tuple(robot.legs[left] for left, _ in mirror(robot).pairs)
+    whole = base == "free"
+    legs = robot.legs if whole else tuple(robot.legs[left] for left, _ in mirror(robot).pairs)
+    half: Half = "own" if whole else "mean"
     nq = BASE_COORDINATES[base] + len(legs) * len(JOINTS)
     q, v, a = (ca.SX.sym(name, nq) for name in "qva")
     lam = ca.SX.sym("lam", 3, len(legs))
     lever = np.array([0.0, 0.0, -robot.foot_radius if contact == "rolling" else 0.0])
     gravity, at_rest = np.array(robot.model.gravity.linear), ca.SX.zeros(nq)
-    forces, feet = newton_euler(robot, legs, (q, v, a), lam, gravity, lever, base)
+    forces, feet = newton_euler(robot, legs, (q, v, a), lam, gravity, lever, base, half)
     # Over an instant only M dv and the impulses count: no gravity, no velocity products.
-    jump, _ = newton_euler(robot, legs, (q, at_rest, a), lam, np.zeros(3), lever, base)
+    jump, _ = newton_euler(robot, legs, (q, at_rest, a), lam, np.zeros(3), lever, base, half)
     constant = robot.parameters.torque_constant
     nb, none = BASE_COORDINATES[base], ca.SX.zeros(3, len(legs))
     apart, _ = newton_euler(robot, legs, (q, v, a), none, gravity, lever, base, "difference")
     leap, _ = newton_euler(
         robot, legs, (q, at_rest, a), none, np.zeros(3), lever, base, "difference"
     )
+    if whole:  # each leg is its own
+        apart, leap = ca.SX.zeros(nq), ca.SX.zeros(nq)
     return FoldedModel(
         robot=robot,
         contact=contact,

@@ -28,7 +28,8 @@ def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
     flights = [t for phase, t in zip(problem.sequence, durations, strict=True) if not phase.stands]
     flight = float(np.mean(flights))
     rise = robot.gravity * flight**2 / 8
-    load = sum(2 * len(p.stands) * t for p, t in zip(problem.sequence, durations, strict=True))
+    legs = 1 if problem.base == "free" else 2  # of each that the model keeps
+    load = sum(legs * len(p.stands) * t for p, t in zip(problem.sequence, durations, strict=True))
     push = robot.mass * robot.gravity * sum(durations) / load
     values, start = {}, 0.0
     for index, (phase, duration) in enumerate(zip(problem.sequence, durations, strict=True)):

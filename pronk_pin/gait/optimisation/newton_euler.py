@@ -18,12 +18,12 @@ from ..._typing import Array
 from ...kinematics import leg_frames, mirror
 from ...robot import JOINTS, Base, Robot
 
-BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3}
-"""Coordinates of the trunk: x and z, and pitch where it is free."""
+BASE_COORDINATES: Mapping[Base, int] = {"locked": 2, "sagittal": 3, "free": 6}
+"""Coordinates of the trunk: x and z, pitch where it is free, then y, roll and yaw."""
 
 
-Half = Literal["mean", "difference"]
-"""Part of a pair of legs: their mean, or half their difference, left less right."""
+Half = Literal["mean", "difference", "own"]
+"""Part of a pair of legs: their mean, half their difference, left less right, or each its own."""
 
 
 class FrameMotion(NamedTuple):
@@ -97,8 +97,9 @@ def newton_euler(
 
     Args:
         robot: The robot.
-        legs: The legs that are kept; each counts twice on the trunk.
-        state: q, v and a of the folded robot, (8,) each, or (9,) with pitch.
+        legs: The legs that are kept; each counts twice on the trunk, once on a free one, which
+            keeps them all.
+        state: q, v and a of the folded robot, (8,) each, or (9,) with pitch, (18,) if free.
         lam: Contact forces of the kept feet in the world frame [N], (3, feet).
         gravity: Gravitational acceleration in the world [m/s^2], shape (3,).
         lever: From a foot's centre to where `lam` acts, in the world [m], shape (3,).
@@ -109,11 +110,12 @@ def newton_euler(
             the right one less.
 
     Returns:
-        The forces that must act along each coordinate (8 or 9), and the motion of the feet.
+        The forces that must act along each coordinate (8, 9 or 18), and the motion of the feet.
     """
     q, v, a = state
     nb = BASE_COORDINATES[base]
-    trunk, rotation = _planar(q[:nb], v[:nb], a[:nb])
+    trunk, rotation, turns = _trunk(q[:nb], v[:nb], a[:nb])
+    count = 1.0 if base == "free" else 2.0  # a leg, or the leg and its mirror image
     on_trunk, moment = _wrench(_inertia(robot, 1), rotation, trunk, gravity)
     pairs = {leg: _links(robot, leg, half) for leg in legs}
     torques, feet = [], []
@@ -123,12 +125,36 @@ def newton_euler(
         carried, torque, foot = _leg(
             robot, leg, pairs[leg], (trunk, rotation), joints, lam[:, i], gravity, lever
         )
-        on_trunk = on_trunk + 2.0 * carried[0]  # the leg and its mirror image
-        moment = moment + 2.0 * carried[1]
+        on_trunk = on_trunk + count * carried[0]
+        moment = moment + count * carried[1]
         torques.append(torque)
         feet.append(foot)
-    along = [on_trunk[0], on_trunk[2], moment[1]][:nb]
+    along = [on_trunk[0], on_trunk[2], ca.dot(turns[0], moment) if turns else moment[1]]
+    if turns:
+        along += [on_trunk[1], *(ca.dot(axis, moment) for axis in turns[1:])]
+    along = along[:nb]
     return ca.vertcat(*along, *torques), feet
+
+
+def _trunk(q: ca.SX, v: ca.SX, a: ca.SX) -> tuple[FrameMotion, ca.SX, list[ca.SX]]:
+    """Motion and rotation of the trunk, and, where it is free, its axes of pitch, roll and yaw.
+
+    The angles are those of `Rz(yaw) Ry(pitch) Rx(roll)`.
+    """
+    if q.numel() <= BASE_COORDINATES["sagittal"]:
+        return *_planar(q, v, a), []
+    position, velocity, acceleration = (ca.vertcat(x[0], x[3], x[1]) for x in (q, v, a))
+    x, y, z = np.eye(3)
+    turned = _rotation(z, q[5])
+    pitching = turned @ ca.DM(y)
+    turned = turned @ _rotation(y, q[2])
+    rolling, yawing = turned @ ca.DM(x), ca.SX(ca.DM(z))
+    omega, alpha = yawing * v[5], yawing * a[5]
+    for axis, row in ((pitching, 2), (rolling, 4)):
+        alpha = alpha + axis * a[row] + ca.cross(omega, axis * v[row])
+        omega = omega + axis * v[row]
+    motion = FrameMotion(position, velocity, acceleration, omega, alpha)
+    return motion, turned @ _rotation(x, q[4]), [pitching, rolling, yawing]
 
 
 def _planar(q: ca.SX, v: ca.SX, a: ca.SX) -> tuple[FrameMotion, ca.SX]:
@@ -222,14 +248,17 @@ def _links(robot: Robot, leg: str, half: Half) -> list[_Link]:
     for k, joints in enumerate(names):
         i, j = (robot.model.getJointId(name) for name in joints)
         own = _inertia(robot, i).turned(frames.rotation[k])
-        image = _inertia(robot, j).turned(images.rotation[k]).mirrored()
-        armature = [float(robot.model.armature[robot.model.joints[n].idx_v]) for n in (i, j)]
+        rotor = float(robot.model.armature[robot.model.joints[i].idx_v])
+        if half != "own":
+            image = _inertia(robot, j).turned(images.rotation[k]).mirrored()
+            other_rotor = float(robot.model.armature[robot.model.joints[j].idx_v])
+            own, rotor = own.paired(image, sign), 0.5 * (rotor + sign * other_rotor)
         links.append(
             _Link(
                 translation=frames.offset[k],
                 axis=np.round(frames.axis[k]),  # the trunk's, as `leg_geometry` has made sure
-                body=own.paired(image, sign),
-                armature=0.5 * (armature[0] + sign * armature[1]),
+                body=own,
+                armature=rotor,
             )
         )
     return links

@@ -16,16 +16,25 @@ from ..._checks import instance_of
 from ..._typing import Array
 from ..._workers import heeding_signals
 from ...errors import GaitNotFound, InvalidInput
+from ...kinematics import mirror
 from ..checks import TOLERANCE
 from ..gait import Gait, GaitPhase, Motion
-from ..problem import ContactPhase, GaitProblem
+from ..problem import ContactPhase, GaitProblem, mirrored_phase
 from .ballistics import check_ballistics
 from .collocation import node_phases, transcribe
 from .elastic import find_conflicts, remedies
 from .folded_model import FoldedModel
 from .guess import vertical_hop
 from .transcription import QUIET, Transcription, Violation
-from .unfold import fitted, fold_problem, touchdown_impulse, unfolded
+from .unfold import (
+    advanced,
+    fitted,
+    fold_problem,
+    mirror_image,
+    mirror_phase,
+    touchdown_impulse,
+    unfolded,
+)
 
 _COLD = QUIET | {
     "ipopt.max_iter": 300,
@@ -38,6 +47,9 @@ _COLD = QUIET | {
     "ipopt.adaptive_mu_globalization": "kkt-error",
     "ipopt.mu_init": 0.5,
 }
+_FREE = {"ipopt.mu_init": 1.0}
+"""A free trunk wants a farther start: half the iterations."""
+
 _WARM = _COLD | {
     "ipopt.warm_start_init_point": "yes",
     "ipopt.mu_init": 1e-6,
@@ -144,15 +156,30 @@ def optimize_gait(
 
 
 def _solution(problem: GaitProblem, state: SolverState, run: _Found) -> GaitSolution:
-    program, model = _program(problem), fold_problem(problem)
+    program = _program(problem)
     values = program.unpack(state.x)
-    motions = {phase.name: unfolded(model, values, phase) for phase in problem.sequence}
+    motions = {phase.name: unfolded(problem, values, phase) for phase in problem.sequence}
     impulses = {
         phase.name: touchdown_impulse(problem, index, motions, values)
         for index, phase in enumerate(problem.sequence)
         if problem.landing(index)
     }
     phases = [fitted(problem, phase, motions[phase.name], values) for phase in problem.sequence]
+    if problem.half_stride:
+        half = problem.speed * sum(phase.duration for phase in phases)
+        for phase in problem.sequence:
+            image = mirrored_phase(phase).name
+            motions[image] = advanced(mirror_image(problem, motions[phase.name]), half)
+        for index, phase in enumerate(problem.sequence):
+            if problem.landing(index):
+                image = mirrored_phase(phase).name
+                partner = list(mirror(problem.robot).partner)
+                impulses[image] = impulses[phase.name][partner] * np.array([1.0, -1.0, 1.0])
+        images = problem.whole_sequence[len(phases) :]
+        phases += [
+            mirror_phase(problem, own, image, half)
+            for own, image in zip(phases, images, strict=True)
+        ]
     return GaitSolution(
         problem=problem,
         gait=Gait(problem.robot.name, problem.speed, problem.apex, tuple(phases)),
@@ -168,7 +195,14 @@ def _solution(problem: GaitProblem, state: SolverState, run: _Found) -> GaitSolu
 
 def fit_phase(solution: GaitSolution, phase: ContactPhase) -> GaitPhase:
     """The Bezier form of a phase of a solution, with the order that `phase` asks for."""
-    return fitted(solution.problem, phase, solution.motions[phase.name], solution.values)
+    problem, values = solution.problem, solution.values
+    names = [own.name for own in problem.sequence]
+    if phase.name in names:
+        return fitted(problem, phase, solution.motions[phase.name], values)
+    own = mirrored_phase(phase)
+    fit = fitted(problem, own, solution.motions[own.name], values)
+    half = problem.speed * solution.gait.duration / 2.0
+    return mirror_phase(problem, fit, phase, half)
 
 
 def resampled(solution: GaitSolution, intervals: Sequence[int]) -> SolverState:
@@ -276,8 +310,9 @@ def _program(problem: GaitProblem) -> Transcription:
 def _solver(structure: GaitProblem, *, warm: bool) -> ca.Function:
     """IPOPT on the exact derivatives of a transcription."""
     nlp = transcribe(structure).nlp
+    options = _COLD | (_FREE if structure.base == "free" else {})
     if not warm:
-        return ca.nlpsol("solver", "ipopt", nlp, _COLD)
+        return ca.nlpsol("solver", "ipopt", nlp, options)
     # The derivatives take ten times as long to write down as all the rest.
     cold = _solver(structure, warm=False)
     derivatives = {option: cold.get_function(name) for option, name in _DERIVATIVES.items()}

@@ -149,7 +149,7 @@ def test_an_initial_solution_must_have_the_same_mesh(solution: GaitSolution) -> 
     ("change", "text"),
     [
         ({"stride": (0.3, 0.1)}, "the shorter one first"),
-        ({"base": "free"}, "unknown base 'free'; choose one of: locked, sagittal"),
+        ({"base": "free"}, "choose gait 'trot', or base 'locked' or 'sagittal'"),
         ({"sequence": PRONK[:1]}, "no flight"),
         ({"sequence": BOUND[:2]}, "the rear legs never stand"),
         ({"sequence": (*PRONK, dataclasses.replace(PRONK[1], name="more"))}, "same feet; merge"),
