@@ -205,8 +205,8 @@ def test_replays_show_the_fallen_and_leave_out_what_there_is_not(
     assert '"before learning"' not in always
     # Who finished no stride is not shown; the others at that speed are.
     films = json.loads(re.search(r"const films = (\{.*?\});\n", made(finish_nothing), re.DOTALL)[1])  # type: ignore[index]
-    shown = {tuple(json.loads(key)[:2]) for key in films}
-    assert {("0.3", "ilc"), ("0", "pd")} <= shown
-    assert ("0", "ilc") not in shown
+    shown = {tuple(json.loads(key)[:3]) for key in films}
+    assert {("0.3", "ilc", "nominal"), ("0", "pd", "nominal"), ("0", "ilc", "payload")} <= shown
+    assert ("0", "ilc", "nominal") not in shown
     with pytest.raises(InvalidInput, match="no stride was finished"):
         made(lambda s: finish_nothing(finish_nothing(s.isel(speed=[1, 0])).isel(speed=[1, 0])))
