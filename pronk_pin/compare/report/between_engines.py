@@ -134,9 +134,11 @@ def _format_winners(winners: pd.DataFrame) -> list[str]:
         return []
     engines = list(winners.columns.unique("engine"))
     where = max(8, *(len(name) for name in winners.index.get_level_values("scenario")))
+    pairs = winners.index.droplevel(["scenario", "joint"]).unique()
+    wide = max(len(" against ".join(pair)) for pair in pairs)
     lines = [
         "change of the mean peak over the other's, and in how many robots it is smaller",
-        f"{'':<28}{'scenario':<{where}}  {'joint':<5}" + "".join(f"{e:>18}" for e in engines),
+        f"{'':<{wide}}  {'scenario':<{where}}  {'joint':<5}" + "".join(f"{e:>18}" for e in engines),
     ]
     differ, open_ = [], 0
     for (controller, against, scenario, joint), row in winners.iterrows():
@@ -147,12 +149,14 @@ def _format_winners(winners: pd.DataFrame) -> list[str]:
         open_ += mark == "  open"
         if mark == "  differ":
             differ.append(f"{question} in the {joint} in {scenario}")
-        lines.append(f"{question:<28}{scenario:<{where}}  {joint:<5}{cells}{mark}")
+        lines.append(f"{question:<{wide}}  {scenario:<{where}}  {joint:<5}{cells}{mark}")
     same, said = len(winners) - len(differ) - open_, " and ".join(engines)
     words = [
         f"In {same} of {len(winners)} comparisons {said} name the same winner for every robot.",
         f"In {open_} an engine's robots do not agree among themselves (open)." if open_ else "",
-        f"They name another one in: {'; '.join(differ)}." if differ else "No other one wins.",
+        f"They name another one in: {'; '.join(differ)}."
+        if differ
+        else "Nowhere do they name different ones.",
     ]
     return ["\n".join(lines), "\n".join(filter(None, words))]
 

@@ -89,6 +89,8 @@ def result_menu(
         learners = [name for name in controllers if any(experiment.controller(name).laws)]
         controller = [*preferred, *learners, *controllers][0]
     scenario = experiment.scenario_names[0] if scenario is None else scenario
+    if speed is not None and not experiment.commands:
+        nearest(list(experiment.speeds), speed, "speed")  # known before anything is read
     strides = results.all_strides(controller=controller, scenario=scenario)
     robot, known, shown = _robots(results, strides, speed, command)
     windows = _windows(strides)

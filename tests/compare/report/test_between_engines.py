@@ -70,7 +70,7 @@ def test_an_engine_under_another_name_names_the_same_winners(tmp_path: Path) -> 
     assert (row["ahead"], row["pairs"]) == (2.0, 2.0)
     text = format_between_engines(results)
     assert "In 2 of 2 comparisons" in text
-    assert "No other one wins." in text
+    assert "Nowhere do they name different ones." in text
 
 
 def test_the_table_has_the_errors_of_each_engine(tmp_path: Path) -> None:
