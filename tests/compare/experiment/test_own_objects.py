@@ -445,4 +445,4 @@ def test_gaits_of_another_base_are_refused() -> None:
     with pytest.raises(InvalidInput, match="comparisons play stance and flight only; choose"):
         Experiment(gaits="bound", speeds=(0.3,), base="free")
     with pytest.raises(InvalidInput, match=r"which ends in \.npz"):
-        Experiment(gaits="trot")
+        Experiment(gaits="moonwalk")
