@@ -8,7 +8,7 @@ from ...errors import InvalidInput
 from ...gait import Gait
 from ..experiment import Cell, Experiment
 from ..simulation import SHORTER, check_memory, number_of_robots
-from ..world import engine_of
+from ..world import check_engine
 
 LONGEST = 30.0
 """Days that an experiment may take, by a hopeful estimate."""
@@ -29,7 +29,7 @@ def check_engines(cells: Iterable[Cell]) -> None:
     asked = {(cell.scenario, cell.seed): cell for cell in cells}
     for cell in asked.values():
         world = cell.world
-        engine_of(world).check(cell.experiment.model, world, cell.experiment.base)
+        check_engine(cell.experiment.model, world, cell.experiment.base)
 
 
 def check_demand(experiment: Experiment, workers: int) -> None:

@@ -18,7 +18,7 @@ from ...control import (
 )
 from ...gait import Gait
 from ...robot import Robot
-from ..world import Motion, Motors, Scenario, SensorSuite, engine_of, level_specific_force
+from ..world import Motion, Motors, Scenario, SensorSuite, level_specific_force, make_world
 from .fall import FallDetector
 from .log import TickLog
 from .playback import (
@@ -76,9 +76,7 @@ class Player:
         known &= tick_loop is None
         gains = spec.gains_of(robot)
         servo = gains if known and scenario.affine else None
-        engine = engine_of(scenario)
-        engine.check(robot, scenario, base)
-        self.world = engine.world(robot, scenario, n, base=base, servo=servo)
+        self.world = make_world(robot, scenario, n, base=base, servo=servo)
         self.motors = Motors(scenario, robot.tau_max, n)
         dt = scenario.timestep
         self.sensors = SensorSuite(

@@ -16,7 +16,7 @@ from ..experiment import initial_feedforward, torque_library
 from ..metrics import STEADY_STRIDES
 from ..report import number
 from ..simulation import Progress, Schedule, simulate
-from ..world import Scenario, engine_of
+from ..world import Scenario, check_engine, engine_of
 from .learning_runs import COMPARED, learn, peaks_by_stride
 
 SHOWN = (0, 1, 5, 15)
@@ -63,7 +63,7 @@ def measure_engine_transfer(
     asked = [scenario.in_engine(engine) for engine in dict.fromkeys(engines)]
     worlds = {engine_of(world).name: world for world in asked}
     for world in asked:
-        engine_of(world).check(robot, world, "locked")
+        check_engine(robot, world, "locked")
     fresh, seeded, skilled = map(load_controller, ("ilc", "model+ilc", "library+ilc"))
     skills = {
         engine: torque_library(learn(robot, gaits, fresh, world, progress=progress))

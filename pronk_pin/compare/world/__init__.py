@@ -6,7 +6,7 @@ Goes out: a `World` of an `Engine` that plays tapes or torques, and what sensors
 
 from .drake_world import DrakeEngine
 from .engine import Engine, Motion, World
-from .engines import ENGINES, engine_of, load_engine
+from .engines import ENGINES, check_engine, engine_of, load_engine, make_world
 from .imu import InertialUnit, level_specific_force
 from .mismatch import KNOWN, MISMATCHES, Mismatch
 from .motors import Motors
@@ -53,10 +53,12 @@ __all__ = [
     "Sensors",
     "World",
     "build_model",
+    "check_engine",
     "engine_of",
     "level_specific_force",
     "load_engine",
     "load_scenario",
+    "make_world",
     "mjcf_parity",
     "mjcf_sha256",
     "mjcf_spec",

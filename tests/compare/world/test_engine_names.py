@@ -39,7 +39,15 @@ class Moon(MujocoEngine):
         return super().world(robot, replace(scenario, gravity=8.0), n, base=base, servo=servo)
 
 
-engine = Moon()
+@dataclass(frozen=True)
+class Broken(MujocoEngine):
+    name: str = "broken"
+
+    def world(self, *arguments, **named):
+        return {}["no"]
+
+
+engine, broken = Moon(), Broken()
 """
 
 SHORT = Schedule(startup=0.2, baseline=1.0, learning=0.0)
@@ -104,6 +112,13 @@ def test_what_an_engine_cannot_do_is_said_before_anything_is_simulated(moon: str
     with pytest.raises(InvalidInput, match="moon: it has no slopes"):
         run_experiment(experiment, "result", workers=1, progress=False)
     assert not Path("result").exists()
+
+
+def test_an_engine_of_ones_own_that_fails_is_named(moon: str) -> None:
+    broken = moon.replace(":engine", ":broken")
+    experiment = Experiment(speeds=(0.3,), controllers=("pd",), engine=broken, schedule=SHORT)
+    with pytest.raises(InvalidInput, match=f"engine {broken} ends in KeyError: 'no'"):
+        run_experiment(experiment, "result", workers=1, progress=False)
 
 
 def test_what_is_no_engine_is_refused(moon: str) -> None:
