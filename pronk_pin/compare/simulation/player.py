@@ -18,7 +18,16 @@ from ...control import (
 )
 from ...gait import Gait
 from ...robot import Robot
-from ..world import Motion, Motors, Scenario, SensorSuite, level_specific_force, make_world
+from ..world import (
+    ENGINES,
+    Motion,
+    Motors,
+    Scenario,
+    SensorSuite,
+    check_motion,
+    level_specific_force,
+    make_world,
+)
 from .fall import FallDetector
 from .log import TickLog
 from .playback import (
@@ -77,6 +86,7 @@ class Player:
         gains = spec.gains_of(robot)
         servo = gains if known and scenario.affine else None
         self.world = make_world(robot, scenario, n, base=base, servo=servo)
+        self._own_engine = scenario.engine not in ENGINES
         self.motors = Motors(scenario, robot.tau_max, n)
         dt = scenario.timestep
         self.sensors = SensorSuite(
@@ -139,6 +149,8 @@ class Player:
                 tape = tape.held(end)
             segment = Segment(who, _excerpt(tape, going, slice(tick, stop)), tick, part)
             motion, measured = playback.play(segment)
+            if self._own_engine:
+                check_motion(motion, self.world.robot, len(who), stop - tick)
             log.write(who, tick, motion)
             played[going] = self._ends(who, measured, tick, tape.length[going], airborne)
             count = np.minimum(played[going], stop) - tick

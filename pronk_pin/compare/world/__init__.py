@@ -5,7 +5,7 @@ Goes out: a `World` of an `Engine` that plays tapes or torques, and what sensors
 """
 
 from .drake_world import DrakeEngine
-from .engine import Engine, Motion, World
+from .engine import Engine, Motion, World, check_motion
 from .engines import ENGINES, check_engine, engine_of, load_engine, make_world
 from .imu import InertialUnit, level_specific_force
 from .mismatch import KNOWN, MISMATCHES, Mismatch
@@ -54,6 +54,7 @@ __all__ = [
     "World",
     "build_model",
     "check_engine",
+    "check_motion",
     "engine_of",
     "level_specific_force",
     "load_engine",

@@ -27,6 +27,7 @@ import numpy as np
 
 from ..._typing import Array, BoolArray, IntArray
 from ...control import Gains
+from ...errors import InvalidInput
 from ...robot import Robot
 from .scenario import Scenario
 
@@ -52,6 +53,26 @@ class Motion(NamedTuple):
     """Trunk's position and quaternion xyzw, shape (m, ticks, 7); None where it cannot turn."""
     twist: Array | None = None
     """Trunk's linear and angular velocity in its own axes [m/s, rad/s], (m, ticks, 6); likewise."""
+
+
+def check_motion(motion: Motion, robot: Robot, m: int, ticks: int) -> None:
+    """Check that a motion of m robots over some ticks has the shapes that `Motion` names.
+
+    Raises:
+        InvalidInput: One is otherwise; it is named.
+    """
+    joints, feet = robot.nu, len(robot.foot_names)
+    sizes: dict[str, tuple[int, ...]] = {
+        "base": (2,),
+        "base_rate": (2,),
+        "joints": (joints,),
+        "joint_rates": (joints,),
+    }
+    sizes |= {"force": (feet, 3), "finite": (), "pose": (7,), "twist": (6,)}
+    for name, size in sizes.items():
+        array, wanted = getattr(motion, name), (m, ticks, *size)
+        if array is not None and np.shape(array) != wanted:
+            raise InvalidInput(f"{name} of a motion has the shape {np.shape(array)}; give {wanted}")
 
 
 class World(Protocol):

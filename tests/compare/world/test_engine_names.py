@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -47,7 +48,23 @@ class Broken(MujocoEngine):
         return {}["no"]
 
 
-engine, broken = Moon(), Broken()
+@dataclass(frozen=True)
+class Short(MujocoEngine):
+    name: str = "short"
+
+    def world(self, *arguments, **named):
+        world = super().world(*arguments, **named)
+        play = world.play
+
+        def three_joints(rows, control):
+            motion = play(rows, control)
+            return motion._replace(joints=motion.joints[..., :3])
+
+        world.play = three_joints
+        return world
+
+
+engine, broken, short = Moon(), Broken(), Short()
 """
 
 SHORT = Schedule(startup=0.2, baseline=1.0, learning=0.0)
@@ -119,6 +136,9 @@ def test_an_engine_of_ones_own_that_fails_is_named(moon: str) -> None:
     experiment = Experiment(speeds=(0.3,), controllers=("pd",), engine=broken, schedule=SHORT)
     with pytest.raises(InvalidInput, match=f"engine {broken} ends in KeyError: 'no'"):
         run_experiment(experiment, "result", workers=1, progress=False)
+    short = replace(experiment, scenarios=(f"nominal+{moon.replace(':engine', ':short')}",))
+    with pytest.raises(InvalidInput, match=r"joints of a motion has the shape \(1, \d+, 3\); give"):
+        run_experiment(short, "result", workers=1, progress=False)
 
 
 def test_what_is_no_engine_is_refused(moon: str) -> None:
