@@ -138,7 +138,7 @@ def test_a_robot_that_leaves_the_finite_numbers_is_reported_and_disturbs_nobody(
 
     def spoil(rows: IntArray, control: Array) -> Motion:
         if 1 in rows and next(count) in (0, 9):  # while it stands, and while it pronks
-            world._state[1, world._qvel] = value
+            world._state[1, world._rates] = value
         return play(rows, control)
 
     world.play = spoil  # type: ignore[method-assign]

@@ -13,13 +13,13 @@ import threading
 import numpy as np
 from pydrake.multibody.tree import default_model_instance
 
-from ...._checks import Interval, whole
 from ...._typing import Array, BoolArray, IntArray
 from ....control import Gains
 from ....robot import Robot
-from ..engine import Motion, World
+from ..engine import Motion
 from ..motors import push_force
 from ..scenario import Scenario
+from ..state_world import StateWorld
 from .drake_trunk import DrakeTrunk
 from .plant import Plant, build_plant
 
@@ -27,7 +27,7 @@ _HUGE = 1e10
 """A state with such a number in it is not finite: MuJoCo's limit."""
 
 
-class DrakeWorld(World):
+class DrakeWorld(StateWorld):
     """n robots in Drake, see `World`; a tick is a step of a discrete plant.
 
     Args:
@@ -51,37 +51,20 @@ class DrakeWorld(World):
         servo: Gains | None,
         approximation: str,
     ) -> None:
-        self.robot, self.scenario, self.n = robot, scenario, whole("n", n, Interval(1, 100_000))
         self._plant = build_plant(robot, scenario, base=base, approximation=approximation)
         plant = self._plant.plant
+        self._coordinates = DrakeTrunk(base, plant.num_positions())
+        super().__init__(
+            *(robot, scenario, n),
+            trunk=self._coordinates,
+            joints=1 + self._plant.joints,
+            rates=1 + plant.num_positions() + self._plant.rates,
+            size=1 + plant.num_multibody_states(),
+        )
         self._scratch = threading.local()
-        self._trunk = DrakeTrunk(base, plant.num_positions())
-        self._base, self._base_rate = self._trunk.x_z, self._trunk.x_z_rate
-        self._joints = 1 + self._plant.joints
-        self._rates = 1 + plant.num_positions() + self._plant.rates
         self._constant = scenario.by_joint("torque_constant", robot)
         self._nv: int = plant.num_velocities()
-        self._state = np.zeros((n, 1 + plant.num_multibody_states()))
         self._servo = None if servo is None else self._servo_law(servo)
-        self.force = np.zeros((n, len(robot.foot_names), 3))
-        self.reset(np.zeros((n, 2)), np.tile(robot.standing[7:], (n, 1)))
-
-    def reset(
-        self,
-        base: Array,
-        joints: Array,
-        base_rate: Array | float = 0.0,
-        joint_rates: Array | float = 0.0,
-        *,
-        pitch: Array | float = 0.0,
-    ) -> None:
-        """See `World`."""
-        state = self._state
-        state[:] = 0.0
-        self._trunk.put(state, pitch)
-        state[:, self._base], state[:, self._joints] = base, joints
-        state[:, self._base_rate], state[:, self._rates] = base_rate, joint_rates
-        self.force[:] = 0.0
 
     def play(self, rows: IntArray, control: Array) -> Motion:
         """See `World`."""
@@ -95,18 +78,7 @@ class DrakeWorld(World):
         applied[..., self._plant.rates] = self._constant * control
         for robot in zip(path, applied, force, pushes, strict=True):
             self._roll(*robot)
-        before = path[:, :-1]
-        return Motion(
-            base=before[..., self._base],
-            base_rate=before[..., self._base_rate],
-            joints=before[..., self._joints],
-            joint_rates=before[..., self._rates],
-            force=force,
-            finite=_finite(path[:, 1:]),
-            path=path,
-            pose=self._trunk.pose(before) if self._trunk.turns else None,
-            twist=self._trunk.twist(before) if self._trunk.turns else None,
-        )
+        return self._motion(path, force, _finite(path[:, 1:]))
 
     def _roll(self, path: Array, applied: Array, force: Array, pushes: Array | None) -> None:
         """Simulate one robot: fills in its path (ticks + 1, nstate) and forces (ticks, 4, 3).
@@ -114,7 +86,7 @@ class DrakeWorld(World):
         Where Drake gives up, the states to come stay NaN. `applied` are the controls' generalized
         forces, shape (ticks, nv).
         """
-        stepper, servo, free = self._stepper, self._servo, self._trunk.free
+        stepper, servo, free = self._stepper, self._servo, self._coordinates.free
         centre = self._plant.trunk.lever
         for tick, torque in enumerate(applied):
             state = path[tick]
@@ -122,7 +94,7 @@ class DrakeWorld(World):
                 law, limit = servo
                 torque = np.minimum(np.maximum(torque - law @ state, -limit), limit)
             if pushes is not None:
-                push = self._trunk.generalized(state, pushes[tick], centre)
+                push = self._coordinates.generalized(state, pushes[tick], centre)
                 torque[: len(push)] = push
             after = stepper.step(state[1:], torque, force[tick])
             if after is None:
@@ -148,54 +120,6 @@ class DrakeWorld(World):
             self._scratch.stepper = _Stepper(self._plant)
         stepper: _Stepper = self._scratch.stepper
         return stepper
-
-    def advance(self, rows: IntArray, motion: Motion, ticks: IntArray) -> None:
-        """See `World`."""
-        m = np.arange(len(rows))
-        self.force[rows] = motion.force[m, ticks - 1]
-        self._state[rows] = motion.path[m, ticks]
-
-    @property
-    def base(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._base]
-
-    @property
-    def base_rate(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._base_rate]
-
-    @property
-    def joints(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._joints]
-
-    @property
-    def joint_rates(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._rates]
-
-    @property
-    def pose(self) -> Array:
-        """See `World`."""
-        return self._trunk.pose(self._state)
-
-    @property
-    def twist(self) -> Array:
-        """See `World`."""
-        return self._trunk.twist(self._state)
-
-    @property
-    def state(self) -> Array:
-        """Time, Drake's q and v of each robot, a copy, shape (n, 1 + nq + nv)."""
-        return self._state.copy()
-
-    def restart(self, rows: IntArray) -> None:
-        """See `World`."""
-        self._state[rows] = 0.0
-        self._trunk.put(self._state, 0.0, rows)
-        self._state[rows[:, None], self._joints] = self.robot.standing[7:]
-        self._state[rows, self._base[1]] = self.robot.standing[2]
 
 
 class _Stepper:

@@ -12,13 +12,13 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 
-from ...._checks import Interval, whole
 from ...._typing import Array, BoolArray, IntArray
 from ....control import Gains
 from ....robot import Robot
 from ..engine import Engine, Motion, World
 from ..motors import push_force
 from ..scenario import Scenario
+from ..state_world import StateWorld
 from .model import build_model
 from .trunk_state import Trunk
 
@@ -37,7 +37,7 @@ def without_warnings() -> Iterator[None]:
         mujoco.set_mju_user_warning(before)
 
 
-class MujocoWorld(World):
+class MujocoWorld(StateWorld):
     """n robots in MuJoCo, see `World`; a tick is a step of `mujoco.rollout`.
 
     Args:
@@ -62,29 +62,26 @@ class MujocoWorld(World):
         base: str = "locked",
         servo: Gains | None = None,
     ) -> None:
-        n = whole("n", n, Interval(1, 100_000))
-        self.robot, self.scenario, self.n = robot, scenario, n
-        self.model = build_model(robot, scenario, base=base, servo=servo)
-        self._models = [self.model] * n  # rollout without checks wants one a robot
+        self.model = model = build_model(robot, scenario, base=base, servo=servo)
+        rates = 1 + model.nq
+        self._warmstart = np.zeros((n, model.nv))
+        super().__init__(
+            *(robot, scenario, n),
+            trunk=Trunk(model, robot),
+            joints=np.array([1 + model.joint(name).qposadr[0] for name in robot.joint_names]),
+            rates=np.array([rates + model.joint(name).dofadr[0] for name in robot.joint_names]),
+            size=mujoco.mj_stateSize(model, _FULL),
+        )
+        self._models = [model] * n  # rollout without checks wants one a robot
         self._scratch = threading.local()
         self._rollout = mujoco.rollout.Rollout(nthread=0)  # on the caller's thread
-        model = self.model
-        nq = model.nq
-        self._qpos = np.array([1 + model.joint(name).qposadr[0] for name in robot.joint_names])
-        self._qvel = np.array([1 + nq + model.joint(name).dofadr[0] for name in robot.joint_names])
         self._ctrl = np.array([model.actuator(name).id for name in robot.joint_names])
-        self._trunk = Trunk(model, robot)
-        self._base, self._base_rate = self._trunk.x_z, self._trunk.x_z_rate
         address = [model.sensor(name).adr[0] for name in robot.foot_names]
         self._force = np.array(address)[:, None] + np.arange(3)
         # Forces on the bodies come after the motors' controls: force and moment, in the world.
         self._control = int(_CONTROL | _PUSHED if scenario.pushes else _CONTROL)
-        trunk = model.body(robot.spec.base_link).id
-        self._push = model.nu + 6 * trunk + np.arange(3)
-        self._state = np.zeros((n, mujoco.mj_stateSize(model, _FULL)))
-        self._warmstart = np.zeros((n, model.nv))
-        self.force = np.zeros((n, *self._force.shape))
-        self.reset(np.zeros((n, 2)), np.tile(robot.standing[7:], (n, 1)))
+        body = model.body(robot.spec.base_link).id
+        self._push = model.nu + 6 * body + np.arange(3)
 
     def reset(
         self,
@@ -96,12 +93,8 @@ class MujocoWorld(World):
         pitch: Array | float = 0.0,
     ) -> None:
         """See `World`."""
-        state = self._state
-        state[:] = 0.0
-        self._trunk.put(state, pitch)
-        state[:, self._base], state[:, self._qpos] = base, joints
-        state[:, self._base_rate], state[:, self._qvel] = base_rate, joint_rates
-        self._warmstart[:], self.force[:] = 0.0, 0.0
+        super().reset(base, joints, base_rate, joint_rates, pitch=pitch)
+        self._warmstart[:] = 0.0
 
     def play(self, rows: IntArray, control: Array) -> Motion:
         """See `World`."""
@@ -128,19 +121,8 @@ class MujocoWorld(World):
             sensordata=sensors,
         )
         path[:, 1:] = states
-        before = path[:, :-1]
-        return Motion(
-            base=before[..., self._base],
-            base_rate=before[..., self._base_rate],
-            joints=before[..., self._qpos],
-            joint_rates=before[..., self._qvel],
-            # The sensors are of the state before each step, and have the floor's side of it.
-            force=-sensors[..., self._force],
-            finite=_finite(states),
-            path=path,
-            pose=self._trunk.pose(before) if self._trunk.turns else None,
-            twist=self._trunk.twist(before) if self._trunk.turns else None,
-        )
+        # The sensors are of the state before each step, and have the floor's side of it.
+        return self._motion(path, -sensors[..., self._force], _finite(states))
 
     @property
     def _data(self) -> mujoco.MjData:
@@ -151,58 +133,19 @@ class MujocoWorld(World):
 
     def advance(self, rows: IntArray, motion: Motion, ticks: IntArray) -> None:
         """See `World`."""
+        super().advance(rows, motion, ticks)
         m = np.arange(len(rows))
-        self.force[rows] = motion.force[m, ticks - 1]
-        self._state[rows] = motion.path[m, ticks]
         rates = slice(1 + self.model.nq, None)
         last = motion.path[m, ticks, rates] - motion.path[m, ticks - 1, rates]
         self._warmstart[rows] = last / self.model.opt.timestep
-
-    @property
-    def base(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._base]
-
-    @property
-    def pose(self) -> Array:
-        """See `World`."""
-        return self._trunk.pose(self._state)
-
-    @property
-    def twist(self) -> Array:
-        """See `World`."""
-        return self._trunk.twist(self._state)
-
-    @property
-    def base_rate(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._base_rate]
-
-    @property
-    def joints(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._qpos]
-
-    @property
-    def joint_rates(self) -> Array:
-        """See `World`."""
-        return self._state[:, self._qvel]
 
     def running(self) -> AbstractContextManager[object]:
         """See `World`."""
         return without_warnings()
 
-    @property
-    def state(self) -> Array:
-        """MuJoCo's full physics state of each robot, a copy, shape (n, nstate)."""
-        return self._state.copy()
-
     def restart(self, rows: IntArray) -> None:
         """See `World`."""
-        self._state[rows] = 0.0
-        self._trunk.put(self._state, 0.0, rows)
-        self._state[rows[:, None], self._qpos] = self.robot.standing[7:]
-        self._state[rows, self._base[1]] = self.robot.standing[2]
+        super().restart(rows)
         self._warmstart[rows] = 0.0
 
 
