@@ -104,7 +104,8 @@ class SpeedCommand:
     Args:
         profiles: The commanded speed of each robot.
         library: Gaits at the speeds that are commanded.
-        torque: Feedforward by speed; none by default.
+        torque: Feedforward by speed; none by default. That of a library of conditions is as at its
+            `home`, until the robots estimate where they are.
         reference: By which speed: "commanded", or "measured", that of the torso at the last
             lift-off, with the commanded one left to the regulation of eq. (12), as in the paper.
         apex: Apex of the gaits [m]; the library's by default.
@@ -135,6 +136,8 @@ class SpeedCommand:
         none_or(instance_of, "torque", torque, TorqueLibrary)
         self.reference = known_name("speed of reference", reference, REFERENCES)
         self._library, self._apex = library, apex
+        self._learned = torque if torque is not None and torque.conditions else None
+        torque = torque if torque is None else torque.in_conditions()
         speeds = library.speeds if torque is None else torque.speeds
         self._slowest = float(max(speeds[0], library.speeds[0]))
         self._fastest = float(min(speeds[-1], library.speeds[-1]))
@@ -176,7 +179,7 @@ class SpeedCommand:
         torque = [self.memory.at(rows, self.speed, part) for part in range(len(PARTS))]
         planned = np.array([gait.flight.duration for gait in self.first_gaits])
         stretch = self.memory.stretch_at(rows, self.speed)
-        return InitialFeedforward(np.stack(torque, axis=1), stretch * planned)
+        return InitialFeedforward(np.stack(torque, axis=1), stretch * planned, self._learned)
 
     def commanded(self, rows: IntArray, time: Array) -> Array:
         """Commanded speeds of some robots at times of their own (m,) [m/s]."""

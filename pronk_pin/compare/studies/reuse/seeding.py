@@ -7,16 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from ..._typing import Array
-from ...control import ControllerSpec, InitialFeedforward, TorqueLibrary, load_controller
-from ...gait import Gait, GaitLibrary
-from ...robot import Robot, RobotSpec
-from ..experiment import initial_feedforward, torque_library
-from ..metrics import STEADY_STRIDES, settling_stride
-from ..report import number
-from ..simulation import Schedule, simulate
-from ..world import Scenario
-from .learning_runs import (
+from ...._typing import Array
+from ....control import ControllerSpec, InitialFeedforward, TorqueLibrary, load_controller
+from ....gait import Gait, GaitLibrary
+from ....robot import Robot, RobotSpec
+from ...experiment import initial_feedforward, torque_library
+from ...metrics import STEADY_STRIDES, settling_stride
+from ...report import number
+from ...simulation import Schedule, simulate
+from ...world import Scenario
+from ..learning_runs import (
     COMPARED,
     learn,
     machine_and_gaits,
