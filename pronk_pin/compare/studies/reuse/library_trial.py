@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -142,26 +143,32 @@ def _row(
 def describe_library_trial(table: pd.DataFrame) -> str:
     """Format the trial for a terminal, and say what it comes to."""
     names = [name.removesuffix("_late") for name in table.columns if name.endswith("_late")]
-    head = "".join(f"{name:>10} {'estimated':>13}" for name in names)
+    digits = {name: _decimals(table[name]) for name in names}
+    head = "".join(f"{name:>8}{'estimated':>14}" for name in names)
     lines = [
         "mean peaks of stance errors from the true contact on, calf/thigh [mrad]; conditions as",
         f"estimated after {TOLD_AFTER} strides and at the end",
-        f"{'speed':>6}{head}" + "".join(f"{kind:>12}" for kind in KINDS) + "  rule",
+        f"{'speed':>6}{head}" + "".join(f"{kind:>8}" for kind in KINDS) + "  rule",
     ]
     for row in table.to_dict("records"):
         told = "".join(
-            f"{row[name]:>10.3g} {row[f'{name}_early']:>6.2g}{row[f'{name}_late']:>7.2g}"
-            for name in names
+            f"{row[name]:>8.{k}f}{row[f'{name}_early']:>7.{k}f}{row[f'{name}_late']:>7.{k}f}"
+            for name, k in digits.items()
         )
         peaks = (
-            "/".join(number(1e3 * row[f"{kind}_{joint}"], ".1f") for joint in COMPARED[::-1])
+            "/".join(number(1e3 * row[f"{kind}_{joint}"], ".0f") for joint in COMPARED[::-1])
             for kind in KINDS
         )
-        rule = "reuse" if row["alike"] else "reuse, tried" if row["tried"] else "practise"
+        rule = "reuse" if row["alike"] else "tried" if row["tried"] else "practise"
         lines.append(
-            f"{row['speed']:>+6.2f}{told}" + "".join(f"{peak:>12}" for peak in peaks) + f"  {rule}"
+            f"{row['speed']:>+6.2f}{told}" + "".join(f"{peak:>8}" for peak in peaks) + f"  {rule}"
         )
     return "\n".join([*lines, "", *_in_words(table, names)])
+
+
+def _decimals(values: pd.Series) -> int:
+    """Decimals with which values of a condition are told apart."""
+    return max(0, 2 - math.floor(math.log10(float(np.ptp(values)) or 1.0)))
 
 
 def _in_words(table: pd.DataFrame, names: Sequence[str]) -> list[str]:
