@@ -299,6 +299,8 @@ class Seeding:
     The torque library learns at all speeds; each inner one begins with its neighbours' torques.
     """
 
+    controller: str = "ilc"
+    """Controller whose laws learn."""
     speed: tuple[float, ...] = ()
     """Speeds [m/s], increasing; by default -0.4 to 0.8 in steps of 0.2, as far as the robot's
     gaits go."""
@@ -315,13 +317,18 @@ class Seeding:
         """Do it."""
         from ..compare import load_scenario
         from ..compare.studies import describe_seeding, measure_seeding
+        from ..control import load_controller
         from ..viz import known_figure, save_figure
         from ..viz.figures import errors_by_seed
 
         known_figure(self.figure)
         speeds = self.speed or _covered(self.robot, self.gaits, _FINE)
         table = measure_seeding(
-            speeds, load_scenario(self.scenario), robot=self.robot, gaits=self.gaits
+            speeds,
+            load_scenario(self.scenario),
+            spec=load_controller(self.controller),
+            robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_seeding(table))
         if self.figure is not None:

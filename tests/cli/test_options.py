@@ -192,7 +192,13 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
     "seeding": (
         Seeding,
         "measure_seeding",
-        {"speed": SPEEDS, "scenario": SCENARIO, "robot": ROBOT, "gaits": GAITS},
+        {
+            "controller": named("spec", "ilc-fast", "--controller ilc-fast"),
+            "speed": SPEEDS,
+            "scenario": SCENARIO,
+            "robot": ROBOT,
+            "gaits": GAITS,
+        },
     ),
     "engines": (
         Engines,
