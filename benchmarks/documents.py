@@ -39,7 +39,7 @@ def printed(command: str) -> str:
             cwd=folder,
             capture_output=True,
             text=True,
-            env={**os.environ, "COLUMNS": "100"},
+            env={**os.environ, "COLUMNS": ""},
         )
     if done.returncode:
         raise RuntimeError(f"{command} ended with {done.returncode}: {done.stderr[-500:]}")

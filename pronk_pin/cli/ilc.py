@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, subcommand
 
+from .._display import show
+
 if TYPE_CHECKING:
     from ..gait import Gait
 
@@ -88,7 +90,7 @@ class Analyze:
                 spec, strides, speed, scenario, number=self.strides, gait=gaits[k]
             )
             predictions.append(compared)
-            print(describe_prediction(predictions[-1]), end="\n\n")
+            show(describe_prediction(predictions[-1]) + "\n")
         if self.figure is not None:
             print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
 
@@ -130,7 +132,7 @@ class Stability:
             robot=self.robot,
             gaits=self.gaits,
         )
-        print(describe_stability(table))
+        show(describe_stability(table))
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,7 @@ class Drive:
             references=self.reference,
             push=self.push,
         )
-        print(format_commands(driving.summary))
+        show(format_commands(driving.summary))
         if self.figure is not None:
             print(f"\nfigure  {save_figure(driving_figure(driving.strides), self.figure)}")
 
@@ -206,7 +208,7 @@ class Wander:
 
         command, scenario = self.command or SWEEPS, load_scenario(self.scenario)
         table = measure_wandering(command, scenario, robot=self.robot, gaits=self.gaits)
-        print(describe_wandering(table))
+        show(describe_wandering(table))
 
 
 @dataclass(frozen=True)
@@ -241,7 +243,7 @@ class Gains:
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
         table = sweep_gains(spec, speeds, scenario, robot=self.robot, gaits=self.gaits)
-        print(describe_gains(table))
+        show(describe_gains(table))
         if self.figure is not None:
             print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
 
@@ -287,7 +289,7 @@ class Transfer:
             robot=self.robot,
             gaits=self.gaits,
         )
-        print(describe_transfers(table))
+        show(describe_transfers(table))
         if self.figure is not None:
             print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
 
@@ -323,7 +325,7 @@ class Seeding:
         table = measure_seeding(
             speeds, load_scenario(self.scenario), robot=self.robot, gaits=self.gaits
         )
-        print(describe_seeding(table))
+        show(describe_seeding(table))
         if self.figure is not None:
             print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
 
@@ -360,7 +362,7 @@ class Engines:
         robot, library = machine_and_gaits(self.robot, self.gaits)
         gaits = [library.at(speed) for speed in speeds]
         table = measure_engine_transfer(robot, gaits, load_scenario(self.scenario), self.engines)
-        print(describe_engine_transfer(table))
+        show(describe_engine_transfer(table))
 
 
 @dataclass(frozen=True)
