@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 from tyro.conf import Positional, arg
 
 from .._display import show
+from .progress import progress
 
 if TYPE_CHECKING:
     from ..compare import Experiment, Results
@@ -183,6 +184,8 @@ class Reproduce:
 
     folder: Path | None = None
     """Results folder; by default results/<time>-paper. One that is there is completed."""
+    speeds: tuple[float, ...] = ()
+    """Desired speeds [m/s]; by default all of the paper's."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the scatter at the start, of which little is left after a second."""
     workers: int | None = None
@@ -194,7 +197,8 @@ class Reproduce:
         from ..compare.experiment import load_suite
         from ..compare.studies import format_reproduction
 
-        experiment = dataclasses.replace(load_suite("paper"), seeds=self.seeds)
+        asked: dict[str, Any] = {"speeds": self.speeds} if self.speeds else {}
+        experiment = load_suite("paper", seeds=self.seeds, **asked)
         folder = self.folder or default_folder("paper")
         results = run_experiment(experiment, folder, workers=self.workers)
         learners = tuple(name for name in experiment.controller_names if name != "pd")
@@ -288,9 +292,10 @@ class Explain:
         strides = results.all_strides(controller=self.controller, scenario=self.scenario)
         rng = np.random.default_rng(self.seed)
         gaits = results.experiment.planned_at(strides["speed"].to_numpy().tolist())
-        explanation = explain(
-            strides, gaits=gaits, imu_noise=self.imu_noise, draws=self.draws, rng=rng
-        )
+        with progress("explaining", counted=False):
+            explanation = explain(
+                strides, gaits=gaits, imu_noise=self.imu_noise, draws=self.draws, rng=rng
+            )
         text = describe(explanation)
         show(f"{cell.controller} in scenario {cell.scenario}\n\n{text}")
         if self.figure is not None:
