@@ -16,7 +16,6 @@ from pronk_pin._typing import Array
 from pronk_pin.robot import ROBOTS
 from pronk_pin.robot.formats.urdf import mujoco_spec
 
-
 os.environ.pop("COLUMNS", None)  # what is printed is as wide as it is, whatever the terminal
 
 
