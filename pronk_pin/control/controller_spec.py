@@ -308,6 +308,10 @@ def load_controller(name: str | ControllerSpec) -> ControllerSpec:
         return name
     if isinstance(name, str) and "=" in name:
         base, _, place = name.partition("=")
+        if not place:
+            raise InvalidInput(
+                f"controller '{name}' names no file; give one, as {base}=hills.npz, or no '='"
+            )
         name = f"{base}={Path(place).stem}"
         return replace(load_controller(base), name=name, library=place, library_sha256="")
     return find("controller", name, CONTROLLERS, ControllerSpec)

@@ -189,3 +189,8 @@ def test_only_what_begins_with_a_library_takes_a_file(hills: Path) -> None:
         load_controller(f"pd={hills}")
     with pytest.raises(FileProblem):
         load_controller("library=nowhere.npz")
+
+
+def test_an_equals_sign_without_a_file_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="names no file"):
+        load_controller("library=")
