@@ -312,6 +312,13 @@ def load_controller(name: str | ControllerSpec) -> ControllerSpec:
             raise InvalidInput(
                 f"controller '{name}' names no file; give one, as {base}=hills.npz, or no '='"
             )
-        name = f"{base}={Path(place).stem}"
-        return replace(load_controller(base), name=name, library=place, library_sha256="")
+        spec, name = load_controller(base), f"{base}={Path(place).stem}"
+        try:
+            file_name("name", name)
+        except InvalidInput as error:
+            raise InvalidInput(
+                f"the file '{place}' cannot be part of a controller's name; rename it, with "
+                "letters, digits and + - _ . alone"
+            ) from error
+        return replace(spec, name=name, library=place, library_sha256="")
     return find("controller", name, CONTROLLERS, ControllerSpec)

@@ -4,7 +4,7 @@ Comes in: robot, speeds, controllers, scenarios and seeds, or the name of a suit
 Goes out: an `Experiment`, its cells and their definition, and the strides of a cell.
 """
 
-from .cell import Cell, run_cell
+from .cell import Cell, check_stored_library, run_cell
 from .definition import Definition, cell_definition, define, differences, fingerprint
 from .description import describe
 from .entries import name_of
@@ -30,6 +30,7 @@ __all__ = [
     "Experiment",
     "cell_definition",
     "check_library",
+    "check_stored_library",
     "define",
     "describe",
     "differences",

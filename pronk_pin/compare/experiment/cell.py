@@ -19,7 +19,13 @@ from ..simulation import Progress, Schedule, simulate
 from ..world import Scenario, load_scenario
 from .definition import cell_definition, define, fingerprint, to_text
 from .entries import named
-from .initial_feedforward import feedforward_by_speed, initial_feedforward, learned_strides
+from .initial_feedforward import (
+    check_library,
+    feedforward_by_speed,
+    initial_feedforward,
+    known_library,
+    learned_strides,
+)
 
 if TYPE_CHECKING:
     from .experiment import Experiment
@@ -124,6 +130,19 @@ class Cell:
         return round((schedule.baseline + schedule.learning) / self.world.timestep)
 
 
+def check_stored_library(cell: Cell) -> None:
+    """Check that the torque library of a cell's controller, if it is in a file, is there and fits.
+
+    Raises:
+        FileProblem: The file is missing, damaged, or another one than it was.
+        InvalidInput: It is of another robot, or other gaits.
+    """
+    experiment, spec = cell.experiment, cell.spec
+    if spec.library:
+        library = known_library(spec, experiment.model, None)
+        check_library(library, experiment.model, experiment.planned_at)
+
+
 def run_cell(
     cell: Cell,
     dependency: xr.Dataset | None = None,
@@ -143,6 +162,7 @@ def run_cell(
     """
     instance_of("cell", cell, Cell, "a Cell, one of Experiment.cells()")
     experiment, spec = cell.experiment, cell.spec
+    check_stored_library(cell)
     gaits, robot, base = experiment.planned_at(cell.speeds), experiment.model, experiment.base
     model = robot
     if spec.source == "identified":

@@ -153,7 +153,11 @@ class Experiment(Displayed):
         }
         for name, values in lists.items():
             if len(values) == 0 or len(set(values)) != len(values):
-                raise InvalidInput(f"{name} must name at least one, and none of them twice")
+                files = any(spec.library for spec in specs) and name == "controllers"
+                told = (
+                    "; of a torque library's file its name counts, not its folder" if files else ""
+                )
+                raise InvalidInput(f"{name} must name at least one, and none of them twice{told}")
         self._check_controllers()
         for world in worlds:
             world.check_joints(self.model)

@@ -129,3 +129,24 @@ def test_conditions_whose_torques_are_alike_are_told_apart() -> None:
     estimate, place = ConditionEstimate(library, 1), {"slope": 0.05, "payload": 0.6}
     estimate.update(ONE, SPEEDS[:1], library.at(SPEEDS[:1], place))
     assert estimate.values[0] == pytest.approx(list(place.values()), abs=1e-3)
+
+
+def test_conditions_that_need_nearly_the_same_torque_are_told_apart() -> None:
+    """Of a correlation of 0.99, from a torque that is exactly one of them."""
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(size=(2, 2, SAMPLES, 12))
+    changes = [one, 0.99 * one + np.sqrt(1.0 - 0.99**2) * other]
+    slopes, loads = np.linspace(0.0, 1.0, 3), np.linspace(0.0, 1.0, 3)
+    torque = slopes[:, None, None, None, None] * changes[0]
+    torque = torque + loads[:, None, None, None] * changes[1]
+    torque = np.stack([torque, torque])
+    library = TorqueLibrary(
+        SPEEDS,
+        torque,
+        np.zeros_like(torque),
+        np.full((2, 3, 3), 0.2),
+        conditions={"slope": slopes, "payload": loads},
+    )
+    estimate, speed = ConditionEstimate(library, 1), SPEEDS[:1]
+    estimate.update(ONE, speed, library.at(speed, {"slope": 0.9, "payload": 0.2}))
+    np.testing.assert_allclose(estimate.values[0], [0.9, 0.2], atol=0.02)
