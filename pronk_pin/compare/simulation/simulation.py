@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from ..._checks import Interval, flag, instance_of, known_name, whole
-from ..._typing import Array, IntArray
+from ..._typing import Array, BoolArray, IntArray
 from ...control import (
     Controller,
     ControllerSpec,
@@ -158,13 +158,13 @@ class Simulation:
             while (going := rows[self._clock[rows] < steps]).size:
                 if before_stride is not None:
                     before_stride(going)
-                late = self.player.late[going]
-                for ticks in np.unique(late):  # those that are equally late together
-                    self._stride(going[late == ticks], steps=steps, late=int(ticks))
+                start = self._clock[going]
+                learning = start >= round(schedule.baseline / self._dt)
+                self._strides(going, learning, self._seconds(steps - start))
                 report()
 
         with self.world.running(), ThreadPoolExecutor(self._threads) as pool:
-            self._startup()
+            self.start_up()
             shares = np.array_split(np.arange(len(self._gaits)), self._threads)
             side_by_side = pool.map if self._threads > 1 else map
             list(side_by_side(strides, shares))  # an error in a thread is raised here
@@ -180,7 +180,7 @@ class Simulation:
         seconds = events.seconds + (0.0 if loop is None else loop.time.seconds)
         return ControlTime(seconds, int(self._clock.sum()))
 
-    def _startup(self) -> None:
+    def start_up(self) -> None:
         """Stand; the last ticks are as if the first stance's touchdown had been sensed late."""
         rows, late = np.arange(len(self._gaits)), self.controller.spec.touchdown_ticks
         ticks = round(self.schedule.startup / self._dt) + late
@@ -188,7 +188,23 @@ class Simulation:
             self.player.play(rows, self.controller.stand(len(piece)), part=None)
         self.player.rewind(rows, np.full(len(rows), len(piece) - late))
 
-    def _stride(self, rows: IntArray, *, steps: int, late: int) -> None:
+    def stride(self, *, learning: bool) -> None:
+        """Simulate one more stride of every robot, beyond any schedule, after `start_up`.
+
+        Args:
+            learning: Whether they learn from the one before.
+        """
+        rows = np.arange(len(self._gaits))
+        self._strides(rows, np.full(len(rows), learning), np.zeros(len(rows)))
+
+    def _strides(self, rows: IntArray, learning: BoolArray, remaining: Array) -> None:
+        """Simulate one stride of some robots, with so much to go (m,) [s]."""
+        late = self.player.late[rows]
+        for ticks in np.unique(late):  # those that are equally late together
+            alike = late == ticks
+            self._stride(rows[alike], learning[alike], remaining[alike], late=int(ticks))
+
+    def _stride(self, rows: IntArray, learning: BoolArray, remaining: Array, *, late: int) -> None:
         """Simulate one stride of some robots, from touchdown to touchdown.
 
         The first was felt late by so many ticks.
@@ -196,9 +212,8 @@ class Simulation:
         controller, strides, player = self.controller, self.strides, self.player
         log = player.log
         start = self._clock[rows]
-        learning = start >= round(self.schedule.baseline / self._dt)
-        learning &= any(law is not None for law in controller.spec.laws)
-        strides.begin(rows, self._seconds(start), learning, remaining=self._seconds(steps - start))
+        learning = learning & any(law is not None for law in controller.spec.laws)
+        strides.begin(rows, self._seconds(start), learning, remaining=remaining)
 
         with controller.time.measured():
             tape = controller.touchdown(rows, learning, late=late)
