@@ -25,7 +25,7 @@ from ...control import (
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
 from ...robot import BASES, Robot
-from ..world import Scenario
+from ..world import Scenario, World
 from .dataset import to_dataset
 from .log import StrideLog
 from .memory import check_memory
@@ -104,24 +104,87 @@ class Simulation:
         )
         self._command = command
         self._threads = threads
-        self.player = Player(
-            robot,
-            gaits,
-            spec,
-            scenario,
-            ticks=self.controller.max_ticks,
-            rng=rng.spawn(1)[0],
-            base=base,
-            balance=self.controller.balance,
-            tick_loop=self.controller.tick_loop,
-            chunked=chunked,
-        )
-        self.world, self.upright = self.player.world, self.player.upright
+        self._chunked, self._base = chunked, base
+        self.player = self._player(scenario, rng)
         self.strides = StrideLog(
             gaits, schedule.duration, dt, others=() if command is None else command.all_gaits
         )
         self._clock = np.zeros(n, dtype=np.intp)  # ticks since the first stride began
         self._stand(robot, rng)
+
+    def _player(self, scenario: Scenario, rng: np.random.Generator) -> Player:
+        return Player(
+            self.controller.robot,
+            self._gaits,
+            self.controller.spec,
+            scenario,
+            ticks=self.controller.max_ticks,
+            rng=rng.spawn(1)[0],
+            base=self._base,
+            balance=self.controller.balance,
+            tick_loop=self.controller.tick_loop,
+            chunked=self._chunked,
+        )
+
+    @property
+    def world(self) -> World:
+        """The robots in the scenario's engine."""
+        return self.player.world
+
+    @property
+    def upright(self) -> BoolArray:
+        """Which robots have not fallen, shape (n,)."""
+        return self.player.upright
+
+    def change_scenario(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """Go on in another scenario from the robots' touchdowns on, with all that they have.
+
+        Robots and motors keep their state, controllers what they estimate and have learned. Trunks
+        must be locked, and time steps the same.
+
+        Args:
+            scenario: The scenario.
+            rng: Source of the sensors' noise in it.
+        """
+        self._check_goes_on(scenario)
+        player = self._player(scenario, rng)
+        player.take_over(self.player)
+        self.player = player
+
+    def change_controller(
+        self, spec: ControllerSpec, command: SpeedCommand, rng: np.random.Generator
+    ) -> None:
+        """Go on under another controller from the robots' touchdowns on, with a memory of its own.
+
+        Args:
+            spec: The controller.
+            command: The speeds that it follows, and its memory.
+            rng: Source of the sensors' noise from then on.
+        """
+        scenario, before = self.world.scenario, self.controller
+        self._check_goes_on(scenario)
+        if self._command is not None:
+            command.speed[:] = self._command.speed  # of the gaits that they land in
+        self.controller = Controller(
+            before.robot,
+            command.first_gaits,
+            spec,
+            timestep=self._dt,
+            **command.initial_feedforward._asdict(),
+            command=command,
+        )
+        self.controller.take_over(before)
+        self._command = command
+        player = self._player(scenario, rng)
+        player.take_over(self.player)
+        self.player = player
+
+    def _check_goes_on(self, scenario: Scenario) -> None:
+        if self._base != "locked" or scenario.timestep != self._dt:
+            raise InvalidInput(
+                "a simulation goes on in another scenario, or under another controller, on base "
+                f"'locked' with the same time step of {self._dt:g} s; make a new one"
+            )
 
     def _stand(self, robot: Robot, rng: np.random.Generator) -> None:
         """Set the robots on the ground in the posture of their first stride."""
@@ -179,6 +242,16 @@ class Simulation:
         events, loop = self.controller.time, self.controller.tick_loop
         seconds = events.seconds + (0.0 if loop is None else loop.time.seconds)
         return ControlTime(seconds, int(self._clock.sum()))
+
+    @property
+    def clock(self) -> float:
+        """Simulated time since the first stride began, of the robot that is ahead [s]."""
+        return float(self._clock.max() * self._dt)
+
+    def restart_log(self) -> None:
+        """Forget all strides, and count strides and time from here on."""
+        self.strides.restart()
+        self._clock -= self._clock.max()
 
     def start_up(self) -> None:
         """Stand; the last ticks are as if the first stance's touchdown had been sensed late."""
