@@ -10,7 +10,7 @@ from ..._checks import Interval, real
 RATES = Interval(0.02, 20.0)
 """Simulated seconds for each second of the wall's."""
 
-_LATE = 0.25
+_LATE = 0.6
 """Lateness from which on the clock goes back to where the robots are, not to race after it [s]."""
 
 

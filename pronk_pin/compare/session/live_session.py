@@ -172,6 +172,16 @@ class LiveSession:
         """The folder that is recorded to; None if none is."""
         return self._recording
 
+    def watch(
+        self,
+        *,
+        on_moment: Callable[[int, Moment], object],
+        on_stride: Callable[[int, LiveStride], object],
+        on_trouble: Callable[[BaseException], object],
+    ) -> None:
+        """Have others told what happens, see the class, in place of those before."""
+        self._on_moment, self._on_stride, self._on_trouble = on_moment, on_stride, on_trouble
+
     # --- going -------------------------------------------------------------------------------
 
     def stride(self, count: int = 1) -> list[list[LiveStride]]:
