@@ -16,7 +16,7 @@ import numpy as np
 
 from ..._checks import Interval, flag, instance_of, known_name, real, whole
 from ..._typing import Array
-from ...control import TorqueLibrary, load_controller
+from ...control import ControllerSpec, TorqueLibrary, load_controller
 from ...errors import InvalidInput, SpeedOutOfRange
 from ..experiment import Experiment
 from ..results import Results
@@ -123,6 +123,8 @@ class LiveSession:
         self._speed = self._known_speed(speed)
         self.base_scenario = experiment.scenario(experiment.scenario_names[0])
         self._scenario, self._values = self.base_scenario, dict[str, float]()
+        self._specs = [experiment.controller(name) for name in names]  # as was asked last
+        self._learning = [False for _ in names]
         self._on_moment, self._on_stride, self._on_trouble = on_moment, on_stride, on_trouble
         self.clock = LiveClock()
         self._running = False
@@ -130,11 +132,11 @@ class LiveSession:
         self._recording: Path | None = None
         self._counting = threading.Lock()
         self._seats = [_Seat() for _ in names]
-        for number, (seat, name) in enumerate(zip(self._seats, names, strict=True)):
+        for number, (seat, spec) in enumerate(zip(self._seats, self._specs, strict=True)):
             seat.robot = LiveRobot(
                 experiment.model,
                 self._library,
-                experiment.controller(name),
+                spec,
                 self._scenario,
                 speed=self._speed,
                 seed=experiment.seeds[0],
@@ -146,6 +148,16 @@ class LiveSession:
     def robots(self) -> tuple[LiveRobot, ...]:
         """The robots; while the session runs, each belongs to its own thread."""
         return tuple(seat.robot for seat in self._seats)
+
+    @property
+    def controllers(self) -> tuple[ControllerSpec, ...]:
+        """The controller of each robot, as was asked last."""
+        return tuple(self._specs)
+
+    @property
+    def learning(self) -> tuple[bool, ...]:
+        """Whether each robot is to learn, as was asked last."""
+        return tuple(self._learning)
 
     @property
     def speed(self) -> float:
@@ -319,6 +331,7 @@ class LiveSession:
         """Switch the learning of a robot on or off; by default of all whose controllers learn."""
         on = flag("learning", on)
         for seat in self._chosen(robot):
+            self._learning[self._seats.index(seat)] = on
             self._ask(seat, setattr, seat.robot, "learning", on)
 
     def set_controller(self, robot: int, name: str) -> None:
@@ -330,11 +343,11 @@ class LiveSession:
         """
         (seat,) = self._chosen(robot)
         spec = load_controller(name)
-        others = [each.robot.controller.name for each in self._seats if each is not seat]
-        if spec.name in others:
+        if spec.name in [each.name for k, each in enumerate(self._specs) if k != robot]:
             raise InvalidInput(f"another robot has the controller '{spec.name}'; choose another")
         seat.robot.check_controller(spec)
         self._check_not_recording()
+        self._specs[robot] = spec
         self._ask(seat, seat.robot.set_controller, spec)
 
     def set_mismatches(self, values: Mapping[str, float]) -> None:
@@ -393,6 +406,8 @@ class LiveSession:
     def reset(self, *, forget: bool = True) -> None:
         """Stand all robots up again, by default with nothing learned and the learning off."""
         self._check_not_recording()
+        if forget:
+            self._learning = [False for _ in self._seats]
         if self._running:
             self.clock.set(-self.robots[0].startup)
         for seat in self._seats:
@@ -436,7 +451,7 @@ class LiveSession:
         datasets = [self._asked(seat, seat.robot.recorded) for seat in self._seats]
         experiment = dataclasses.replace(
             self.experiment,
-            controllers=tuple(seat.robot.controller for seat in self._seats),
+            controllers=self.controllers,
             scenarios=(self._scenario,),
             seeds=self.experiment.seeds[:1],
             speeds=(),

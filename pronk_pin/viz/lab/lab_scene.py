@@ -32,8 +32,8 @@ def lab_scene(session: LiveSession) -> Scene:
     robot, scenario = session.experiment.model, session.scenario
     q = robot.standing[None]
     tracks = []
-    for number, each in enumerate(session.robots):
-        style = look(each.controller.name)
+    for number, spec in enumerate(session.controllers):
+        style = look(spec.name)
         red, green, blue = (max(part, _DARKEST) for part in to_rgb(style.color))
         track = Track(
             style.label,
@@ -44,7 +44,7 @@ def lab_scene(session: LiveSession) -> Scene:
             error=np.full((1, robot.nu), _ERROR),  # which sets the ends of the scales
             torque=_USE * robot.tau_max[None],
         )
-        tracks.append(track.moved(y=places(len(session.robots))[number]))
+        tracks.append(track.moved(y=places(len(session.controllers))[number]))
     return Scene(
         robot,
         tracks,

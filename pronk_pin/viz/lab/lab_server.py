@@ -134,7 +134,7 @@ class LabServer(LiveServer):
         self._moments[robot] = moment
 
     def _finished(self, robot: int, stride: LiveStride) -> None:
-        told = {**stride._asdict(), "controller": self.session.robots[robot].controller.name}
+        told = stride._asdict()
         if stride.number == 0:
             self._strides[robot].clear()
         self._strides[robot].append(told)
@@ -175,13 +175,13 @@ class LabServer(LiveServer):
             "recording": None if session.recording is None else str(session.recording),
             "robots": [
                 {
-                    "name": each.controller.name,
-                    "label": look(each.controller.name).label,
-                    "color": look(each.controller.name).color,
-                    "learning": each.learning,
-                    "learns": any(each.controller.laws),
+                    "name": spec.name,
+                    "label": look(spec.name).label,
+                    "color": look(spec.name).color,
+                    "learning": learning,
+                    "learns": any(spec.laws),
                 }
-                for each in session.robots
+                for spec, learning in zip(session.controllers, session.learning, strict=True)
             ],
         }
 
@@ -233,22 +233,9 @@ class LabServer(LiveServer):
             self._events.clear()
             self._tell_all({"reset": True})
         if isinstance(asked, SetController | SetWorld):
-            self.renew()
-        # What was asked takes effect at touchdowns, half a second on.
-        for later in (0.0, 0.6):
-            self._loop.call_soon_threadsafe(self._loop.call_later, later, self._renew_state)
-
-    def _renew_state(self) -> None:
-        self._tell_state()
-
-    def renew(self) -> None:
-        """Show the robots and the world as they are now, once they are."""
-
-        def show() -> None:
             self.scene = lab_scene(self.session)
             self._tell_all({"scene": True})
-
-        self._loop.call_soon_threadsafe(self._loop.call_later, 0.6, show)
+        self._tell_state()
 
     def save_skill(self, robot: int) -> bytes:
         """The file of what a robot plays."""

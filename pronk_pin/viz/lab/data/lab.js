@@ -132,6 +132,13 @@ class Lab {
       new Chart("touchdown, late by", "ms", "touchdown", 1000, {signed: true, level: false}),
     ];
     this.panel(); this.bar(); this.dragging();
+    // Before the player's own keys: space pauses the robots, and an arrow goes on by a stride.
+    document.addEventListener("keydown", (event) => {
+      const id = {" ": "pause", ArrowRight: "step", l: "learn"}[event.key];
+      if (!id || event.ctrlKey || event.metaKey || event.target.matches("select, input, button")) return;
+      $(id).click();
+      event.preventDefault(); event.stopImmediatePropagation();
+    }, {capture: true});
     window.addEventListener("resize", () => { this.dirty = true; });
     const tick = () => { if (this.dirty) this.draw(); requestAnimationFrame(tick); };
     tick();
@@ -183,7 +190,7 @@ class Lab {
       $("drives").textContent = this.driving ? "" : "another page drives; this one watches";
     }
     if (message.state) this.show(message.state);
-    if (message.events) this.events.push(...message.events);
+    if (message.events) this.events = [...this.events, ...message.events].slice(-300);
     for (const event of message.events || []) if (event.do === "push") this.pushed(event);
     for (const [robot, stride] of message.strides || []) {
       const kept = this.strides[robot] = this.strides[robot] || [];
