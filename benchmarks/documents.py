@@ -27,20 +27,26 @@ _OF_THIS_RUN = re.compile(
 def printed(command: str) -> str:
     """What a command of `pronk-pin` prints, without what is of this run alone.
 
+    Of several, joined by " && ", the last one's; they run in the same folder.
+
     Raises:
         RuntimeError: It fails.
     """
+    with tempfile.TemporaryDirectory() as folder:
+        return [_run(each, folder) for each in command.split(" && ")][-1]
+
+
+def _run(command: str, folder: str) -> str:
     program, *words = shlex.split(command)
     if program != "pronk-pin":
         raise ValueError(f"{command}: documents hold the output of pronk-pin")
-    with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [sys.executable, "-m", "pronk_pin", *words],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            env={**os.environ, "COLUMNS": "100"},
-        )
+    done = subprocess.run(
+        [sys.executable, "-m", "pronk_pin", *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "COLUMNS": "100"},
+    )
     if done.returncode:
         raise RuntimeError(f"{command} ended with {done.returncode}: {done.stderr[-500:]}")
     return _OF_THIS_RUN.sub("", done.stdout).strip("\n")

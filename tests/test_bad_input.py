@@ -37,8 +37,8 @@ from pronk_pin.compare.simulation import memory
 from pronk_pin.compare.simulation.quantities import STRIDE_QUANTITIES
 from pronk_pin.compare.studies.gain_reduction import sweep_gains
 from pronk_pin.compare.studies.prediction import simulate_learning
-from pronk_pin.compare.studies.seeding import measure_seeding
-from pronk_pin.compare.studies.transfer import measure_transfers
+from pronk_pin.compare.studies.reuse.seeding import measure_seeding
+from pronk_pin.compare.studies.reuse.transfer import measure_transfers
 from pronk_pin.control import (
     AttitudeFilter,
     AttitudeRegulator,

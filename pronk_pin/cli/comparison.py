@@ -42,9 +42,10 @@ class ExperimentOptions(TypedDict, total=False):
     speeds: tuple[float, ...]
     """Desired speeds [m/s]; by default all of the gait library, the A1's -0.5 to 0.8."""
     controllers: Annotated[tuple[str, ...], arg(metavar="[NAME|MODULE:OBJECT [...]]")]
-    """Controllers: names of `pronk-pin list controllers`, or addresses; by default pd, ilc-paper,
-    ilc-stance, ilc, ilc+rotors, model, model+rotors and library, less those that need rotors which
-    are not known of the robot."""
+    """Controllers: names of `pronk-pin list controllers`, or addresses; library=FILE begins with
+    the torques of `pronk-pin ilc build-library`; by default pd, ilc-paper, ilc-stance, ilc,
+    ilc+rotors, model, model+rotors and library, less those that need rotors which are not known of
+    the robot."""
     scenarios: Annotated[tuple[str, ...], arg(metavar="[NAME|MODULE:OBJECT [...]]")]
     """Scenarios: names of `pronk-pin list scenarios`, composed with "+", values with "=", as
     payload=2+slope; or addresses; by default nominal."""

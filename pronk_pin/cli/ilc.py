@@ -299,6 +299,8 @@ class Seeding:
     The torque library learns at all speeds; each inner one begins with its neighbours' torques.
     """
 
+    controller: str = "ilc"
+    """Controller whose laws learn."""
     speed: tuple[float, ...] = ()
     """Speeds [m/s], increasing; by default -0.4 to 0.8 in steps of 0.2, as far as the robot's
     gaits go."""
@@ -315,17 +317,126 @@ class Seeding:
         """Do it."""
         from ..compare import load_scenario
         from ..compare.studies import describe_seeding, measure_seeding
+        from ..control import load_controller
         from ..viz import known_figure, save_figure
         from ..viz.figures import errors_by_seed
 
         known_figure(self.figure)
         speeds = self.speed or _covered(self.robot, self.gaits, _FINE)
         table = measure_seeding(
-            speeds, load_scenario(self.scenario), robot=self.robot, gaits=self.gaits
+            speeds,
+            load_scenario(self.scenario),
+            spec=load_controller(self.controller),
+            robot=self.robot,
+            gaits=self.gaits,
         )
         print(describe_seeding(table))
         if self.figure is not None:
             print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
+
+
+@dataclass(frozen=True)
+class BuildLibrary:
+    """Practise over a grid of speeds and conditions, and keep what is learned in one file.
+
+    A controller begins with it as library=FILE, or library+ilc=FILE: where it is on the slope, or
+    how much it carries, a robot estimates from its first strides. Run again after it was broken
+    off it goes on where it was.
+    """
+
+    file: Positional[Path]
+    """File of the library, which ends in .npz."""
+    condition: tuple[str, ...] = ("slope=-0.1,0,0.1",)
+    """Conditions with their values, one or more: mismatches of `pronk-pin list scenarios`, as
+    slope=-0.1,0,0.1 or payload=0,1.5,3."""
+    speed: tuple[float, ...] = ()
+    """Speeds [m/s], increasing; by default five from -0.4 to 0.8, or from end to end of the robot's
+    gaits where they do not go so far."""
+    scenario: str = "nominal"
+    """What is the same in all conditions."""
+    controller: str = "ilc"
+    """Controller that learns."""
+    robot: str = "a1"
+    """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+    folder: Path | None = None
+    """Results folder of the practice, which `report` and `view` open; by default <file>-practice,
+    beside it."""
+    workers: int | None = None
+    """Processes; by default one for each core."""
+
+    def run(self) -> None:
+        """Do it."""
+        from ..compare.studies import (
+            build_library,
+            describe_library,
+            machine_and_gaits,
+            parse_conditions,
+        )
+        from ..control import load_controller
+        from ..errors import InvalidInput
+
+        if self.file.suffix != ".npz":
+            raise InvalidInput(f"file '{self.file}' does not end in .npz; let it")
+        conditions = parse_conditions(self.condition)
+        covered = machine_and_gaits(self.robot, self.gaits)[1].speeds
+        first, last = max(covered[0], -0.4), min(covered[-1], 0.8)
+        evenly = (round(first + k * (last - first) / 4, 9) for k in range(5))
+        library = build_library(
+            self.speed or tuple(map(float, evenly)),
+            conditions,
+            self.scenario,
+            self.folder or self.file.with_name(f"{self.file.stem}-practice"),
+            spec=load_controller(self.controller),
+            robot=self.robot,
+            gaits=self.gaits,
+            workers=self.workers,
+        )
+        library.save(self.file)
+        print(f"{describe_library(library)}\n\nlibrary  {self.file}")
+
+
+@dataclass(frozen=True)
+class TryLibrary:
+    """Play a library of `build-library` at places in between, beside practice there.
+
+    The places are drawn at random. At each the robot is told of the conditions, then it has to
+    estimate them; beside that PD alone, the model's torques, and learning from nothing.
+    """
+
+    file: Positional[Path]
+    """File of the library."""
+    points: int = 20
+    """Number of places."""
+    seed: int = 0
+    """Seed of the places."""
+    scenario: str = "nominal"
+    """What is the same in all conditions."""
+    robot: str = "a1"
+    """Robot."""
+    gaits: str = "pronk"
+    """Its gaits: pronk, as shipped for it, or a file of `pronk-pin gaits build`."""
+
+    def run(self) -> None:
+        """Do it."""
+        import numpy as np
+
+        from .._checks import seed
+        from ..compare import load_scenario
+        from ..compare.studies import describe_library_trial, measure_library
+        from ..control import TorqueLibrary
+
+        table = measure_library(
+            TorqueLibrary.load(self.file),
+            load_scenario(self.scenario),
+            points=self.points,
+            rng=np.random.default_rng(seed("seed", self.seed)),
+            robot=self.robot,
+            gaits=self.gaits,
+            progress=True,
+        )
+        print(describe_library_trial(table))
 
 
 @dataclass(frozen=True)
@@ -375,6 +486,8 @@ class Ilc:
         | Annotated[Wander, subcommand("wander")]
         | Annotated[Transfer, subcommand("transfer")]
         | Annotated[Seeding, subcommand("seeding")]
+        | Annotated[BuildLibrary, subcommand("build-library")]
+        | Annotated[TryLibrary, subcommand("try-library")]
         | Annotated[Engines, subcommand("engines")]
     )
 

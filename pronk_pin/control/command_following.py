@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .._typing import Array, IntArray
+from .._typing import Array, BoolArray, IntArray
 from ..errors import InvalidInput
 from ..gait import Gait
 from ..kinematics import leg_geometry, leg_motion
@@ -18,6 +18,9 @@ from .speed_command import SpeedCommand
 
 _STEADY = 0.05
 """Change of the gait's speed [m/s] in a stride below which there is none."""
+
+_UNCHANGED = 2
+"""Strides without a change after which a stride tells of the conditions."""
 
 _SETTLED = 5
 """Strides without a change after which a robot is as usual."""
@@ -178,6 +181,28 @@ class CommandFollower:
         self._standing[rows] = landed
         self._feedforward[rows, 0] = memory.at(rows, landed, 0)
         self._stance.change(rows, [self._gaits[row].stance for row in rows], 1.0)
+
+    def steady(self, rows: IntArray) -> BoolArray:
+        """Whether robots' gaits have not changed for some strides, shape (m,)."""
+        same = np.abs(self._command.speed[rows] - self._standing[rows]) < _STEADY
+        return np.asarray(same & (self._since[rows] >= _UNCHANGED))
+
+    def stored(self, rows: IntArray) -> Array:
+        """Speeds for which robots store what they play [m/s], shape (m, knots)."""
+        return np.tile(self._command.memory.speeds, (len(rows), 1))
+
+    def shift(self, rows: IntArray, change: Memory) -> None:
+        """Change what robots store for each speed.
+
+        Args:
+            rows: Which robots.
+            change: What comes on top: torques (m, knots, 2, samples, 12) [N m], and durations of
+                flights (m, knots) [s].
+        """
+        memory = self._command.memory
+        memory.feedforward[rows] += change.feedforward
+        lasting = np.interp(memory.speeds, self._command.speeds, self._lasting)
+        memory.stretch[rows] += change.flight / lasting
 
     def joined(
         self, rows: IntArray, began: Array, position: Array, velocity: Array

@@ -21,11 +21,14 @@ from .command_following import CommandFollower
 from .controller_spec import ControllerSpec
 from .feedback import SpeedEstimator
 from .learning import (
+    FIRST_STRIDES,
     SKIPPED,
+    ConditionEstimate,
     GuardState,
     LawContext,
     LearningLaw,
     Memory,
+    TorqueLibrary,
     anti_windup,
     bound,
     delivered,
@@ -89,6 +92,8 @@ class Controller:
         tick_loop: What asks the tick controller; None where tapes and gains make the torques.
         time: How long the controller has computed at events.
         guard: The guard of the learning; None without one.
+        conditions: Estimate of the conditions that the robots are in; None where they begin with
+            torques of none.
         skipped: Reason not to learn from the robots' last strides, index into `SKIPPED`,
             shape (n,).
     """
@@ -104,6 +109,7 @@ class Controller:
         flight: Array | None = None,
         base: str = "locked",
         command: SpeedCommand | None = None,
+        library: TorqueLibrary | None = None,
     ) -> None:
         gaits = known_gaits(robot, gaits)
         instance_of("spec", spec, ControllerSpec, "a ControllerSpec, as load_controller() returns")
@@ -146,6 +152,9 @@ class Controller:
         self.guard = None
         if spec.guard is not None:
             self.guard = GuardState(spec.guard, Memory(self.feedforward, self._flight.duration))
+        self.conditions = None
+        if library is not None and library.conditions:
+            self.conditions = ConditionEstimate(library, n)
         self._always_retimes = flight is None and not any(self._laws)
         self._thigh = leg_geometry(robot).sense[:, 1]  # sense in which the thighs turn legs back
         self._lift_off_speed = np.array([lift_off_speed(gait) for gait in gaits])
@@ -214,6 +223,7 @@ class Controller:
         if learning is not None:
             learns = usable & learning
             learns[learning] &= ~self._roll_back(rows[learning], usable[learning])
+            learns &= ~self._recognise(rows, learns)
         self._learn(rows[learns])
         self._retime(rows[usable if self._always_retimes else learns])
         if self._following is not None and before is not None:
@@ -423,6 +433,56 @@ class Controller:
         self.feedforward[who] = self.guard.best.feedforward[who]
         self._flight.stretch(who, self.guard.best.flight[who])
         return back
+
+    def _recognise(self, rows: IntArray, learns: BoolArray) -> BoolArray:
+        """Go on with what the library has for the conditions that the last strides show.
+
+        Robots that learn do so in their first strides, and begin to learn from there.
+
+        Args:
+            rows: Which robots.
+            learns: Whether they are to learn from their last strides, shape (m,).
+
+        Returns:
+            Which of them learn in this way, shape (m,).
+        """
+        conditions = self.conditions
+        if conditions is None:
+            return np.zeros(len(rows), dtype=bool)
+        recognises = learns.copy()
+        if any(self._laws):
+            recognises &= conditions.strides[rows] < FIRST_STRIDES
+        if self._following is not None:
+            recognises &= self._following.steady(rows)
+        who = rows[recognises]
+        if who.size:
+            records = [delivered(last.take(who)) for last in self._last]
+            torque = np.stack([each.feedforward + each.feedback for each in records], axis=1)
+            speeds = np.array([self.gaits[row].speed for row in who])
+            # Of all speeds that are stored, where there is a command.
+            stored = speeds[:, None] if self._following is None else self._following.stored(who)
+            each, at = np.repeat(who, stored.shape[1]), stored.ravel()
+            before = conditions.memory(each, at)
+            conditions.update(who, speeds, torque)
+            after = conditions.memory(each, at)
+            change = Memory(
+                *(
+                    (new - old).reshape(*stored.shape, *new.shape[1:])
+                    for new, old in zip(after, before, strict=True)
+                )
+            )
+            if self._following is None:
+                self.feedforward[who] += change.feedforward[:, 0]
+                self._flight.stretch(who, self._flight.duration[who] + change.flight[:, 0])
+                self._retime(who)  # conditions in between land in between
+            else:
+                self._following.shift(who, change)
+        return recognises
+
+    @property
+    def learns(self) -> bool:
+        """Whether anything is learned from strides: by laws, or of the conditions."""
+        return any(law is not None for law in self._laws) or self.conditions is not None
 
     def _memory_of(self, rows: IntArray) -> Memory:
         """What some robots play, copied."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from .._checks import (
     SHARE,
@@ -30,6 +31,7 @@ from .learning import (
     PaperILC,
     PDTypeILC,
     StrideSelection,
+    TorqueLibrary,
     known_law,
 )
 from .signals import ContactDetector, FlightTiming, Gains, ZeroPhaseFilter
@@ -64,6 +66,10 @@ class ControllerSpec:
         name: Short name, as on the command line.
         source: Source of its initial feedforward: "none", "model", "library", or "identified", the
             model with the parameters identified from learned torques.
+        library: File of the torque library, see `TorqueLibrary.save`, where that is the source; by
+            default it is learned by `ilc` in the same scenario. Where it is of conditions, as slope
+            or payload, these are estimated once learning is switched on, see `ConditionEstimate`.
+        library_sha256: SHA-256 of that file, by default as it is now; another one is refused.
         gait_model: Model that its gaits are optimised with, one of `GAIT_MODELS`: the URDF's, which
             the shipped gaits are; with the rotors' inertia of the datasheet (`RobotSpec.rotors`),
             which the torques of source "model" know then, too; or the identified one.
@@ -96,6 +102,8 @@ class ControllerSpec:
 
     name: str
     source: str = "none"
+    library: str = ""
+    library_sha256: str = ""
     gait_model: str = "urdf"
     knows: tuple[str, ...] = ()
     law: LearningLaw | None = None
@@ -119,6 +127,7 @@ class ControllerSpec:
         file_name("name of a controller", self.name)
         prefix = f"controller '{self.name}': "
         known_name("source of feedforward", self.source, SOURCES)
+        self._check_library(prefix)
         known_name("model of the gaits", self.gait_model, GAIT_MODELS)
         if self.gait_model == "identified" and self.source != "identified":
             raise InvalidInput(
@@ -159,6 +168,21 @@ class ControllerSpec:
         # Contacts are sensed a tick late.
         whole(f"{prefix}touchdown_ticks", self.touchdown_ticks, Interval(1, 50))
 
+    def _check_library(self, prefix: str) -> None:
+        for name in ("library", "library_sha256"):
+            text(prefix + name, getattr(self, name))
+        if not self.library:
+            return
+        if self.source != "library":
+            raise InvalidInput(
+                f"{prefix}library '{self.library}' is not used by source '{self.source}'; give "
+                "source='library', or leave it out"
+            )
+        if not self.library_sha256:
+            place = Path(self.library).expanduser().resolve()
+            object.__setattr__(self, "library", str(place))
+            object.__setattr__(self, "library_sha256", TorqueLibrary.load(place).sha256)
+
     def gains_of(self, robot: Robot) -> Gains:
         """The feedback gains with which it controls a robot."""
         own = Gains.of(robot) if self.gains is None else self.gains
@@ -193,6 +217,16 @@ _MODEL_ROTORS = ControllerSpec(
     knows=("urdf", "rotors"),
 )
 
+_ILC_FAST = replace(
+    _ILC,
+    name="ilc-fast",
+    coupling=0.5,
+    timing=FlightTiming(gain=0.8),
+    flight_law=replace(FLIGHT_LAW, gain=1.0),
+)
+"""Settles in fewer strides, see docs/learning.md: the touchdown comes sooner to the tick where it
+stays."""
+
 _ILC_ROTORS = replace(_ILC, name="ilc+rotors", gait_model="datasheet", knows=("rotors",))
 
 _COMPUTED_TORQUE = ControllerSpec(
@@ -208,6 +242,7 @@ CONTROLLERS = {
     for spec in (
         ControllerSpec("pd"),
         _ILC,
+        _ILC_FAST,
         ControllerSpec("model", source="model", knows=_URDF),
         ControllerSpec("library", source="library", timing=FlightTiming()),
         replace(_ILC, name="model+ilc", source="model", knows=_URDF),
@@ -259,13 +294,20 @@ def load_controller(name: str | ControllerSpec) -> ControllerSpec:
 
     Args:
         name: One of `CONTROLLERS`, the name of an entry point of the group `pronk_pin.controllers`,
-            or the address of a `ControllerSpec`, as in "my_package.wbc:controller"; one itself is
-            returned as it is.
+            or the address of a `ControllerSpec`, as in "my_package.wbc:controller"; or one of these
+            that begins with a torque library, with the file of one, as in "library=hills.npz". A
+            specification itself is returned as it is.
 
     Raises:
         UnknownName: There is none.
-        InvalidInput: What the address names cannot be imported, or is something else.
+        InvalidInput: What the address names cannot be imported, or is something else; or a library
+            is given to a controller that begins with something else.
+        FileProblem: The file of the library is missing or damaged.
     """
     if isinstance(name, ControllerSpec):
         return name
+    if isinstance(name, str) and "=" in name:
+        base, _, place = name.partition("=")
+        name = f"{base}={Path(place).stem}"
+        return replace(load_controller(base), name=name, library=place, library_sha256="")
     return find("controller", name, CONTROLLERS, ControllerSpec)

@@ -104,7 +104,8 @@ class SpeedCommand:
     Args:
         profiles: The commanded speed of each robot.
         library: Gaits at the speeds that are commanded.
-        torque: Feedforward by speed; none by default.
+        torque: Feedforward by speed; none by default. That of a library of conditions is as at its
+            `home`, until the robots estimate where they are.
         reference: By which speed: "commanded", or "measured", that of the torso at the last
             lift-off, with the commanded one left to the regulation of eq. (12), as in the paper.
         apex: Apex of the gaits [m]; the library's by default.
@@ -135,6 +136,8 @@ class SpeedCommand:
         none_or(instance_of, "torque", torque, TorqueLibrary)
         self.reference = known_name("speed of reference", reference, REFERENCES)
         self._library, self._apex = library, apex
+        self._learned = torque if torque is not None and torque.conditions else None
+        torque = torque if torque is None else torque.in_conditions()
         speeds = library.speeds if torque is None else torque.speeds
         self._slowest = float(max(speeds[0], library.speeds[0]))
         self._fastest = float(min(speeds[-1], library.speeds[-1]))
@@ -167,7 +170,8 @@ class SpeedCommand:
     def remember(self, torque: TorqueLibrary | None) -> None:
         """Have the robots play other torques from their next touchdown on; None for none.
 
-        Beyond the speeds of the torques they are held as they are at the nearest of them.
+        Beyond the speeds of the torques they are held as they are at the nearest of them; where
+        they are of conditions, too, those of `TorqueLibrary.home` are played.
 
         Raises:
             InvalidInput: The torques are of another number of joints, or samples.
@@ -176,11 +180,12 @@ class SpeedCommand:
         if torque is None:
             memory.feedforward[:], memory.stretch[:] = 0.0, 1.0
             return
-        if torque.torque.shape[1:] != memory.feedforward.shape[2:]:
+        if torque.torque.shape[-3:] != memory.feedforward.shape[2:]:
             raise InvalidInput(
-                f"torques of shape {torque.torque.shape[1:]} at each speed, and these robots take "
+                f"torques of shape {torque.torque.shape[-3:]} at each speed, and these robots take "
                 f"{memory.feedforward.shape[2:]}; give a library that was learned by this robot"
             )
+        torque = torque.in_conditions()
         near = np.clip(memory.speeds, torque.speeds[0], torque.speeds[-1])
         near = np.clip(near, self._library.speeds[0], self._library.speeds[-1])
         flight = np.interp(near, torque.speeds, torque.flight)
@@ -221,7 +226,7 @@ class SpeedCommand:
         torque = [self.memory.at(rows, self.speed, part) for part in range(len(PARTS))]
         planned = np.array([gait.flight.duration for gait in self.first_gaits])
         stretch = self.memory.stretch_at(rows, self.speed)
-        return InitialFeedforward(np.stack(torque, axis=1), stretch * planned)
+        return InitialFeedforward(np.stack(torque, axis=1), stretch * planned, self._learned)
 
     def commanded(self, rows: IntArray, time: Array) -> Array:
         """Commanded speeds of some robots at times of their own (m,) [m/s]."""

@@ -11,7 +11,7 @@ Comes in: paths, and what is to be written.
 Goes out: files, and what they hold: text, documents, arrays; or a `FileProblem`.
 """
 
-from .arrays import StoredArrays, read_arrays, write_arrays
+from .arrays import StoredArrays, arrays_sha256, read_arrays, write_arrays
 from .documents import (
     as_type,
     from_text,
@@ -40,6 +40,7 @@ __all__ = [
     "LARGEST_FILE",
     "REINSTALL",
     "StoredArrays",
+    "arrays_sha256",
     "as_type",
     "check_file",
     "clear_partial_files",

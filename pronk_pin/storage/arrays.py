@@ -114,7 +114,7 @@ class StoredArrays(dict[str, npt.NDArray[Any]]):
             raise self.damaged("it has no 'sha256'")
         seal = self.text("sha256")
         del self["sha256"]
-        if seal != _arrays_sha256(self):
+        if seal != arrays_sha256(self):
             raise self.damaged("it was changed after it was written")
 
     def _array(self, name: str, kinds: str, what: str) -> npt.NDArray[Any]:
@@ -194,13 +194,13 @@ def write_arrays(
     stored = {name: np.asarray(array) for name, array in arrays.items()}
     if schema is not None:
         stored = {"schema": np.array(schema), **stored}
-    stored["sha256"] = np.array(_arrays_sha256(stored))
+    stored["sha256"] = np.array(arrays_sha256(stored))
     stream = io.BytesIO()
     np.savez_compressed(stream, **stored)  # type: ignore[arg-type]
     return write_file(path, stream.getvalue(), remedy=remedy)
 
 
-def _arrays_sha256(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
+def arrays_sha256(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
     """SHA-256 of arrays with their names, types and shapes."""
     digest = hashlib.sha256()
     for name, array in sorted(arrays.items()):

@@ -21,12 +21,24 @@ from pronk_pin import cli
 from pronk_pin.cli import main
 from pronk_pin.cli.comparison import ExperimentOptions, Explain, Report, Reproduce, ScheduleOptions
 from pronk_pin.cli.gaits import Build, Plot, Show
-from pronk_pin.cli.ilc import Analyze, Drive, Engines, Gains, Seeding, Stability, Transfer, Wander
+from pronk_pin.cli.ilc import (
+    Analyze,
+    BuildLibrary,
+    Drive,
+    Engines,
+    Gains,
+    Seeding,
+    Stability,
+    Transfer,
+    TryLibrary,
+    Wander,
+)
 from pronk_pin.cli.parity import Parity
 from pronk_pin.cli.play import Play
 from pronk_pin.cli.view import FilmOptions, View
 from pronk_pin.compare import Experiment, MujocoEngine, Results, Schedule, run_experiment
 from pronk_pin.compare.experiment import load_suite
+from pronk_pin.control import SAMPLES, TorqueLibrary
 from pronk_pin.gait import load_library
 
 Arguments = dict[str, Any]
@@ -181,7 +193,13 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
     "seeding": (
         Seeding,
         "measure_seeding",
-        {"speed": SPEEDS, "scenario": SCENARIO, "robot": ROBOT, "gaits": GAITS},
+        {
+            "controller": named("spec", "ilc-fast", "--controller ilc-fast"),
+            "speed": SPEEDS,
+            "scenario": SCENARIO,
+            "robot": ROBOT,
+            "gaits": GAITS,
+        },
     ),
     "engines": (
         Engines,
@@ -198,8 +216,37 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
             "gaits": Case("--gaits GAITS", lambda given: len(given["gaits"]), 2),
         },
     ),
+    "build-library hills.npz": (
+        BuildLibrary,
+        "build_library",
+        {
+            "condition": Case(
+                "--condition payload=0,2 slope=0,0.1",
+                lambda given: {k: v.tolist() for k, v in given["conditions"].items()},
+                {"payload": [0.0, 2.0], "slope": [0.0, 0.1]},
+            ),
+            "speed": SPEEDS,
+            "scenario": argument("scenario", "payload", "--scenario payload"),
+            "controller": named("spec", "ilc-stance", "--controller ilc-stance"),
+            "robot": ROBOT,
+            "gaits": GAITS,
+            "folder": argument("folder", Path("there"), "--folder there"),
+            "workers": argument("workers", 1, "--workers 1"),
+        },
+    ),
+    "try-library HILLS": (
+        TryLibrary,
+        "measure_library",
+        {
+            "points": argument("points", 3, "--points 3"),
+            "seed": Case("--seed 5", lambda given: given["rng"].random(), 0.8050029237453802),
+            "scenario": SCENARIO,
+            "robot": ROBOT,
+            "gaits": GAITS,
+        },
+    ),
 }
-ELSEWHERE = {"figure", "result"}
+ELSEWHERE = {"figure", "result", "file"}
 """Options of studies that come after the work, or instead of it: see below."""
 
 
@@ -228,10 +275,47 @@ def test_an_option_of_a_study_reaches_the_study(
     some_gaits(tmp_path / "mine.npz", 5, 12)  # from 0 to 0.6 m/s
     _, function, cases = STUDIES[study]
     case, places = cases[option], {"GAITS": str(tmp_path / "mine.npz"), "0.1_2s": "0.1 2s"}
+    places["HILLS"] = str(hills(tmp_path))
     words = [places.get(word, word) for word in split(case.words)]
-    given = arguments(["ilc", study, *words], STUDY + function)
+    command = ["ilc", *(places.get(word, word) for word in study.split())]
+    given = arguments([*command, *words], STUDY + function)
     assert case.found(given) == case.value
-    assert case.found(arguments(["ilc", study], STUDY + function)) != case.value
+    assert case.found(arguments(command, STUDY + function)) != case.value
+
+
+def hills(folder: Path) -> Path:
+    """The file of a small library of slopes."""
+    zeros = np.zeros((2, 2, 2, SAMPLES, 12))
+    speeds, slopes = np.array([0.0, 0.2]), {"slope": np.array([0.0, 0.1])}
+    library = TorqueLibrary(speeds, zeros, zeros, np.full((2, 2), 0.2), conditions=slopes)
+    library.save(folder / "hills.npz")
+    return folder / "hills.npz"
+
+
+def test_a_library_is_built_into_its_file_with_the_practice_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    built, seen = TorqueLibrary.load(hills(tmp_path)), []
+
+    def build(*args: object, **named: object) -> TorqueLibrary:
+        seen.append(args[-1])
+        return built
+
+    monkeypatch.setattr("pronk_pin.compare.studies.build_library", build)
+    assert main(["ilc", "build-library", str(tmp_path / "mine.npz")]) == 0
+    assert seen == [tmp_path / "mine-practice"]
+    assert TorqueLibrary.load(tmp_path / "mine.npz").sha256 == built.sha256
+    assert f"library  {tmp_path / 'mine.npz'}" in capsys.readouterr().out
+    assert main(["ilc", "build-library", str(tmp_path / "mine.txt")]) != 0
+    assert "end in .npz" in capsys.readouterr().err
+
+
+def test_the_library_of_the_file_is_tried(
+    tmp_path: Path, arguments: Callable[..., Arguments]
+) -> None:
+    path = hills(tmp_path)
+    given = arguments(["ilc", "try-library", str(path)], STUDY + "measure_library")
+    assert given["library"].sha256 == TorqueLibrary.load(path).sha256
 
 
 def test_every_option_of_a_study_has_its_case() -> None:
@@ -240,7 +324,9 @@ def test_every_option_of_a_study_has_its_case() -> None:
         assert set(cases) <= options_of(kind), kind
 
 
-@pytest.mark.parametrize("study", sorted(set(STUDIES) - {"engines", "stability", "wander"}))
+@pytest.mark.parametrize(
+    "study", [study for study, (kind, *_) in STUDIES.items() if "figure" in options_of(kind)]
+)
 def test_the_figure_of_a_study_is_written_where_it_is_asked_for(
     study: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

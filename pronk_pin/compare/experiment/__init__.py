@@ -12,6 +12,7 @@ from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment
 from .experiment_file import GAITS, URDF, from_document, read_config, to_document
 from .initial_feedforward import (
     LIBRARY_VARIABLES,
+    check_library,
     feedforward_by_speed,
     initial_feedforward,
     torque_library,
@@ -28,6 +29,7 @@ __all__ = [
     "Definition",
     "Experiment",
     "cell_definition",
+    "check_library",
     "define",
     "describe",
     "differences",

@@ -11,6 +11,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, TypeAlias
 
+from ...control import ControllerSpec
 from ...robot import Robot, feedback_gains, motor_constants
 from ...storage import sha256
 from ..world import mjcf_sha256 as mjcf_digest
@@ -45,7 +46,7 @@ def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definit
             for speed, gait in zip(experiment.speeds, experiment.planned, strict=True)
         },
         "controllers": {
-            name: describe(experiment.controller(name))
+            name: _controller(experiment.controller(name))
             for name in sorted({cell.controller for cell in experiment.cells()})
         },
         "scenarios": {
@@ -53,6 +54,12 @@ def define(experiment: Experiment, *, mjcf_sha256: str | None = None) -> Definit
         },
         **(_driving(experiment) if experiment.commands else {}),
     }
+
+
+def _controller(spec: ControllerSpec) -> Definition:
+    described: Definition = describe(spec)
+    described.pop("library", None)  # where it lies changes nothing; what it says does
+    return described
 
 
 def _driving(experiment: Experiment) -> Definition:

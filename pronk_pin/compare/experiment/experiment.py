@@ -49,12 +49,18 @@ from .description import describe
 from .entries import digest_of, name_of, named, shortest
 
 LEARNED = ("library", "identified")
-"""Sources of feedforward that need the strides of a cell in which `ilc` has learned."""
+"""Sources of feedforward that need the strides of a cell in which `ilc` has learned, unless they
+are in a file."""
 
 DEFAULT_CONTROLLERS = (
     *("pd", "ilc-paper", "ilc-stance", "ilc", "ilc+rotors"),
     *("model", "model+rotors", "library"),
 )
+
+
+def depends_on_learning(spec: ControllerSpec) -> bool:
+    """Whether a controller begins with what `ilc` learns in the same scenario."""
+    return spec.source in LEARNED and not spec.library
 
 
 def default_controllers(robot: Robot) -> tuple[str, ...]:
@@ -409,7 +415,7 @@ class Experiment(Displayed):
     def cells(self) -> tuple[Cell, ...]:
         """The simulations, in an order in which each finds what it depends on done before it."""
         controllers = list(self.controller_names)
-        later = [name for name in controllers if self.controller(name).source in LEARNED]
+        later = [name for name in controllers if depends_on_learning(self.controller(name))]
         if self.commands:
             places = [(scenario, seed) for scenario in self.scenario_names for seed in self.seeds]
             practices = places if later else []
@@ -524,7 +530,7 @@ class Cell:
     @property
     def depends_on(self) -> Cell | None:
         """The cell that learns what this one uses: the torque library, or the identified model."""
-        if self.practice or self.spec.source not in LEARNED:
+        if self.practice or not depends_on_learning(self.spec):
             return None
         practice = bool(self.experiment.commands)
         return dataclasses.replace(self, controller="ilc", practice=practice)

@@ -14,24 +14,27 @@ from ...control import (
     model_feedforward,
     phase_grid,
 )
-from ...errors import InvalidInput
+from ...errors import FileProblem, InvalidInput
 from ...gait import Gait
 from ...robot import Robot
 from ..metrics import steady
 
-LIBRARY_VARIABLES = ("count", "learning", "feedforward", "flight_reference")
+LIBRARY_VARIABLES = ("count", "learning", "feedforward", "feedback", "flight_reference")
 """What of a learned cell's strides the torque library is made of."""
 
 
 def torque_library(strides: xr.Dataset) -> TorqueLibrary:
     """The torque library learned in a simulation: means over its steady strides (section III.B)."""
     end = steady(strides)
-    torque = end["feedforward"].interp(phase=phase_grid(), method="cubic")
-    torque = torque.transpose("speed", "stride", "part", "phase", "joint")
-    flight = end["flight_reference"].transpose("speed", "stride")
-    return TorqueLibrary.from_strides(
-        strides["speed"].to_numpy(), torque.to_numpy(), flight.to_numpy()
+    torque, feedback = (
+        end[name]
+        .interp(phase=phase_grid(), method="cubic")
+        .transpose("speed", "stride", "part", "phase", "joint")
+        .to_numpy()
+        for name in ("feedforward", "feedback")
     )
+    flight = end["flight_reference"].transpose("speed", "stride").to_numpy()
+    return TorqueLibrary.from_strides(strides["speed"].to_numpy(), torque, flight, feedback)
 
 
 def initial_feedforward(
@@ -57,8 +60,9 @@ def initial_feedforward(
     if spec.source in ("model", "identified"):
         return InitialFeedforward(model_feedforward(model, gaits, base=base))
     if spec.source == "library":
-        library = torque_library(learned_strides(spec, learned))
-        return library.initial_feedforward(np.array([gait.speed for gait in gaits]))
+        library = known_library(spec, model, learned)
+        initial = library.initial_feedforward(np.array([gait.speed for gait in gaits]))
+        return initial._replace(library=library) if library.conditions else initial
     return InitialFeedforward()
 
 
@@ -79,7 +83,7 @@ def feedforward_by_speed(
     if spec.source == "none":
         return None
     if spec.source == "library":
-        return torque_library(learned_strides(spec, learned))
+        return known_library(spec, model, learned)
     torque = model_feedforward(model, gaits)
     return TorqueLibrary(
         np.array([gait.speed for gait in gaits]),
@@ -87,6 +91,41 @@ def feedforward_by_speed(
         np.zeros_like(torque),
         np.array([gait.flight.duration for gait in gaits]),
     )
+
+
+def known_library(spec: ControllerSpec, robot: Robot, learned: xr.Dataset | None) -> TorqueLibrary:
+    """The torque library that a controller begins with: its file's, or that of some strides.
+
+    Raises:
+        FileProblem: The file is missing, damaged, or another one than it was.
+        InvalidInput: There is no file, and there are no strides; or it is of another robot.
+    """
+    if not spec.library:
+        return torque_library(learned_strides(spec, learned))
+    library = TorqueLibrary.load(spec.library)
+    if library.sha256 != spec.library_sha256:
+        raise FileProblem(
+            spec.library,
+            f"another torque library than the one that controller '{spec.name}' was made with",
+            "put that one back, or make the controller again, and use another results folder",
+        )
+    check_library(library, robot)
+    return library
+
+
+def check_library(library: TorqueLibrary, robot: Robot) -> None:
+    """Refuse torques that another robot has learned.
+
+    Raises:
+        InvalidInput: They are.
+    """
+    joints = library.torque.shape[-1]
+    if library.robot not in ("", robot.name) or joints != robot.nu:
+        whose = f"of {library.robot}" if library.robot else f"for {joints} joints"
+        raise InvalidInput(
+            f"this torque library is {whose}, and the robot is {robot.name} with {robot.nu} "
+            "joints; give one that it has learned itself"
+        )
 
 
 def learned_strides(spec: ControllerSpec, strides: xr.Dataset | None) -> xr.Dataset:

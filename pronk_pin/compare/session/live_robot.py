@@ -213,7 +213,7 @@ class LiveRobot:
     @property
     def skill(self) -> TorqueLibrary:
         """What it plays, by speed."""
-        return self._command(self._spec).learned(0)
+        return replace(self._command(self._spec).learned(0), robot=self._robot.name)
 
     def stride(self) -> LiveStride:
         """Simulate a stride, from touchdown to touchdown; the first one from standing."""
@@ -349,10 +349,11 @@ class LiveRobot:
             InvalidInput: They are not.
         """
         shape = (len(PARTS), SAMPLES, self._robot.nu)
-        if skill.torque.shape[1:] != shape:
+        if skill.torque.shape[-3:] != shape or skill.robot not in ("", self._robot.name):
+            whose = f" of {skill.robot}" if skill.robot else ""
             raise InvalidInput(
-                f"the skill has torques of shape {skill.torque.shape[1:]} at each speed, and this "
-                f"robot plays {shape}; load one that it has learned"
+                f"the skill{whose} has torques of shape {skill.torque.shape[-3:]} at each speed, "
+                f"and this robot plays {shape}; load one that it has learned"
             )
 
     def begin_recording(self) -> None:

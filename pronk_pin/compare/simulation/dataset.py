@@ -10,12 +10,13 @@ import numpy as np
 import xarray as xr
 
 from ..._typing import Array
-from ...control import PARTS, SKIPPED, SpeedCommand, phase_grid
+from ...control import PARTS, SKIPPED, SpeedCommand, TorqueLibrary, phase_grid
 from ...gait import Gait
 from ...robot import Robot
 from .log import StrideLog
 from .quantities import (
     COMMAND_QUANTITIES,
+    CONDITION_QUANTITIES,
     GAIT_QUANTITIES,
     LABELS,
     SAMPLES,
@@ -32,6 +33,7 @@ def to_dataset(
     *,
     attributes: Mapping[str, str | int | float],
     command: SpeedCommand | None = None,
+    library: TorqueLibrary | None = None,
 ) -> xr.Dataset:
     """Label the strides of a simulation.
 
@@ -43,10 +45,14 @@ def to_dataset(
     state is that before the tick, a torque and a force act during it.
 
     Where speeds are commanded, the dimension `command` takes the place of `speed`, with the
-    profiles as they are written, and what is of a gait has the dimension `stride` too.
+    profiles as they are written, and what is of a gait has the dimension `stride` too. Where the
+    conditions of a torque library are estimated, these are the dimension `condition`.
     """
     last = int(log.count.max(initial=0))
     robots, given, quantities = _robots(gaits, command)
+    conditions = () if library is None else tuple(library.conditions)
+    if conditions:
+        quantities = (*quantities, *CONDITION_QUANTITIES)
     values = {
         "count": log.count,
         **{name: log[name][:, :last] for name in log.names},
@@ -72,6 +78,7 @@ def to_dataset(
             "rotation": labels["rotation"],
             "foot": list(robot.legs),
             "direction": labels["direction"],
+            **({"condition": list(conditions)} if conditions else {}),
         },
         attrs=dict(attributes),
     )

@@ -25,6 +25,7 @@ from ..world import Motion
 from .contact_errors import ContactErrors
 from .quantities import (
     COMMAND_QUANTITIES,
+    CONDITION_QUANTITIES,
     EVERY,
     LAST,
     SAMPLES,
@@ -167,13 +168,15 @@ class StrideLog:
 
     Its arrays are those of `STRIDE_QUANTITIES`, `log["peak_error"]` for instance, whose first axes
     are n robots and strides, NaN where a stride has not come so far; those of `COMMAND_QUANTITIES`,
-    NaN where no speed is commanded; and those of `TICK_QUANTITIES`, see `ticks`.
+    NaN where no speed is commanded; those of
+    `CONDITION_QUANTITIES`; and those of `TICK_QUANTITIES`, see `ticks`.
 
     Args:
         gaits: The gait of each robot.
         duration: How long is simulated [s].
         timestep: Length of a tick [s].
         others: Gaits that robots may change to.
+        conditions: Number of conditions that are estimated.
 
     Attributes:
         count: Strides that each robot has finished, shape (n,).
@@ -186,6 +189,7 @@ class StrideLog:
         timestep: float,
         *,
         others: Sequence[Gait] = (),
+        conditions: int = 0,
     ) -> None:
         n = len(gaits)
         parts = [[getattr(gait, part).duration for gait in gaits] for part in PARTS]
@@ -204,9 +208,9 @@ class StrideLog:
         longest = max(getattr(gait, part).duration for gait in (*gaits, *others) for part in PARTS)
         ticks = int(np.ceil(LONGEST_PART * longest / timestep))
         sizes = {"speed": n, "stride": self._strides, "tick": ticks, **sizes_of(gaits[0])}
-        self._arrays = {
-            each.name: each.empty(sizes) for each in (*STRIDE_QUANTITIES, *COMMAND_QUANTITIES)
-        }
+        sizes["condition"] = conditions
+        kept = (*STRIDE_QUANTITIES, *COMMAND_QUANTITIES, *CONDITION_QUANTITIES)
+        self._arrays = {each.name: each.empty(sizes) for each in kept}
         self._ticks = {each.name: each.empty(sizes) for each in TICK_QUANTITIES}
 
     def __getitem__(self, name: str) -> npt.NDArray[np.floating[Any]]:

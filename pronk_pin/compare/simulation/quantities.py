@@ -144,6 +144,16 @@ COMMAND_QUANTITIES = (
 )
 """Quantities of every stride of robots whose speed is commanded."""
 
+CONDITION_QUANTITIES = (
+    Quantity(
+        "conditions",
+        (*_STRIDE, "condition"),
+        "SI",
+        "conditions by whose torques the stride was played, as estimated",
+    ),
+)
+"""Quantities of every stride of robots that estimate the conditions of a torque library."""
+
 TICK_QUANTITIES = (
     Quantity("tick_joints", (*_TICK, "joint"), "rad", "measured joint angle at each tick"),
     Quantity(

@@ -21,6 +21,7 @@ from ...control import (
     ControlTime,
     InitialFeedforward,
     SpeedCommand,
+    TorqueLibrary,
 )
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
@@ -62,6 +63,8 @@ class Simulation:
             physics. By default the caller's only, as simulations run side by side in processes.
         command: Commanded speeds, for which the robots' gaits change at each stride, on a locked
             base; by default they keep theirs. Their first gaits are `command.first_gaits`.
+        library: Torque library that the feedforward is from, if it is one of conditions that are to
+            be estimated.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class Simulation:
         chunked: bool = True,
         threads: int = 1,
         command: SpeedCommand | None = None,
+        library: TorqueLibrary | None = None,
     ) -> None:
         gaits = known_gaits(robot, gaits)
         instance_of("scenario", scenario, Scenario, "a Scenario, as load_scenario() returns it")
@@ -101,13 +105,18 @@ class Simulation:
             flight=flight,
             base=base,
             command=command,
+            library=library,
         )
         self._command = command
         self._threads = threads
         self._chunked, self._base = chunked, base
         self.player = self._player(scenario, rng)
         self.strides = StrideLog(
-            gaits, schedule.duration, dt, others=() if command is None else command.all_gaits
+            gaits,
+            schedule.duration,
+            dt,
+            others=() if command is None else command.all_gaits,
+            conditions=0 if library is None else len(library.conditions),
         )
         self._clock = np.zeros(n, dtype=np.intp)  # ticks since the first stride began
         self._stand(robot, rng)
@@ -285,11 +294,13 @@ class Simulation:
         controller, strides, player = self.controller, self.strides, self.player
         log = player.log
         start = self._clock[rows]
-        learning = learning & any(law is not None for law in controller.spec.laws)
+        learning = learning & controller.learns
         strides.begin(rows, self._seconds(start), learning, remaining=remaining)
 
         with controller.time.measured():
             tape = controller.touchdown(rows, learning, late=late)
+        if controller.conditions is not None:
+            strides["conditions"][rows, strides.count[rows]] = controller.conditions.values[rows]
         if self._command is not None:
             gaits = [controller.gaits[row] for row in rows]
             commanded = self._command.commanded(rows, self._seconds(start))
@@ -388,9 +399,12 @@ def simulate(
         flight=initial.flight,
         base=base,
         command=command,
+        library=initial.library,
     )
     attributes = {"robot": robot.name} if attributes is None else attributes
     log = simulation.run(progress)
     if control_time is not None:
         control_time.add(simulation.control_time)
-    return to_dataset(log, robot, gaits, attributes=attributes, command=command)
+    return to_dataset(
+        log, robot, gaits, attributes=attributes, command=command, library=initial.library
+    )

@@ -15,7 +15,6 @@ from .driving import (
     measure_driving,
     measure_wandering,
 )
-from .engine_transfer import describe_engine_transfer, measure_engine_transfer
 from .gain_reduction import describe_gains, sweep_gains
 from .identified_models import close_loop, format_loop
 from .learning_runs import machine_and_gaits
@@ -28,9 +27,22 @@ from .prediction import (
     stored_learning,
 )
 from .reproduce import format_reproduction
-from .seeding import describe_seeding, measure_seeding, stayed_up
+from .reuse import (
+    TOLERANCE,
+    build_library,
+    describe_engine_transfer,
+    describe_library,
+    describe_library_trial,
+    describe_seeding,
+    describe_transfers,
+    measure_engine_transfer,
+    measure_library,
+    measure_seeding,
+    measure_transfers,
+    parse_conditions,
+    stayed_up,
+)
 from .stability import COUPLINGS, describe_stability, measure_stability
-from .transfer import TOLERANCE, describe_transfers, measure_transfers
 
 __all__ = [
     "COUPLINGS",
@@ -42,10 +54,13 @@ __all__ = [
     "TOLERANCE",
     "Driving",
     "Prediction",
+    "build_library",
     "close_loop",
     "compare_prediction",
     "describe_engine_transfer",
     "describe_gains",
+    "describe_library",
+    "describe_library_trial",
     "describe_prediction",
     "describe_seeding",
     "describe_stability",
@@ -56,10 +71,12 @@ __all__ = [
     "machine_and_gaits",
     "measure_driving",
     "measure_engine_transfer",
+    "measure_library",
     "measure_seeding",
     "measure_stability",
     "measure_transfers",
     "measure_wandering",
+    "parse_conditions",
     "simulate_learning",
     "stayed_up",
     "stored_learning",

@@ -4,6 +4,7 @@ Comes in: a `StrideRecord`, and a `LiftedModel` for laws that need one.
 Goes out: the next stride's feedforward, and torque libraries of what was learned.
 """
 
+from .condition_estimate import FIRST_STRIDES, ConditionEstimate
 from .guard import GuardState, LearningGuard, Memory
 from .laws import (
     FLIGHT_LAW,
@@ -26,8 +27,10 @@ from .symmetry import symmetric
 from .torque_library import InitialFeedforward, TorqueLibrary
 
 __all__ = [
+    "FIRST_STRIDES",
     "FLIGHT_LAW",
     "SKIPPED",
+    "ConditionEstimate",
     "CurrentIterationILC",
     "GuardState",
     "InitialFeedforward",

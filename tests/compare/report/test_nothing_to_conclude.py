@@ -30,8 +30,8 @@ from pronk_pin.compare.report.verdict import suite_verdict, verdict
 from pronk_pin.compare.studies.gain_reduction import describe_gains
 from pronk_pin.compare.studies.learning_runs import mean_peaks
 from pronk_pin.compare.studies.reproduce import format_reproduction
-from pronk_pin.compare.studies.seeding import LEARNERS, describe_seeding
-from pronk_pin.compare.studies.transfer import describe_transfers
+from pronk_pin.compare.studies.reuse.seeding import LEARNERS, describe_seeding
+from pronk_pin.compare.studies.reuse.transfer import describe_transfers
 from pronk_pin.control import SKIPPED
 from pronk_pin.viz.figures.learning_figures import errors_by_seed
 from pronk_pin.viz.figures.suite_figures import by_scenario

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from pronk_pin.compare import Experiment, Schedule, run_cell
-from pronk_pin.compare.studies.seeding import (
+from pronk_pin.compare.studies.reuse.seeding import (
     LEARNERS,
     describe_seeding,
     measure_seeding,

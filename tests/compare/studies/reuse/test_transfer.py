@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pronk_pin.compare.studies.transfer import TOLERANCE, may_be_reused, measure_transfers
+from pronk_pin.compare.studies.reuse.transfer import TOLERANCE, may_be_reused, measure_transfers
 from pronk_pin.compare.world.scenario import load_scenario
 from pronk_pin.control import load_controller
 from pronk_pin.errors import InvalidInput

@@ -7,17 +7,17 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from ..._checks import sequence_of, text
-from ...control import InitialFeedforward, load_controller
-from ...errors import InvalidInput
-from ...gait import Gait
-from ...robot import Robot
-from ..experiment import initial_feedforward, torque_library
-from ..metrics import STEADY_STRIDES
-from ..report import number
-from ..simulation import Progress, Schedule, simulate
-from ..world import Scenario, check_engine, engine_of
-from .learning_runs import COMPARED, learn, peaks_by_stride
+from ...._checks import sequence_of, text
+from ....control import InitialFeedforward, load_controller
+from ....errors import InvalidInput
+from ....gait import Gait
+from ....robot import Robot
+from ...experiment import initial_feedforward, torque_library
+from ...metrics import STEADY_STRIDES
+from ...report import number
+from ...simulation import Progress, Schedule, simulate
+from ...world import Scenario, check_engine, engine_of
+from ..learning_runs import COMPARED, learn, peaks_by_stride
 
 SHOWN = (0, 1, 5, 15)
 """Strides of learning in the table; 0 is the last one before."""

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from ..._typing import Array
-from ...control import ControllerSpec, InitialFeedforward
-from ...gait import Gait, GaitLibrary
-from ...robot import RobotSpec
-from ..experiment import torque_library
-from ..report import number
-from ..simulation import Schedule, simulate
-from ..world import Scenario
-from .learning_runs import (
+from ...._typing import Array
+from ....control import ControllerSpec, InitialFeedforward
+from ....gait import Gait, GaitLibrary
+from ....robot import RobotSpec
+from ...experiment import torque_library
+from ...report import number
+from ...simulation import Schedule, simulate
+from ...world import Scenario
+from ..learning_runs import (
     COMPARED,
     learn,
     learning_law,
