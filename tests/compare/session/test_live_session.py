@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pronk_pin.compare import Experiment, Results
-from pronk_pin.compare.session import LiveSession, LiveStride, Moment
+from pronk_pin.compare.session import LiveSession, LiveStride, Moment, live_robot
 from pronk_pin.control import TorqueLibrary
 from pronk_pin.errors import InvalidInput, SpeedOutOfRange, UnknownName
 
@@ -114,8 +114,8 @@ def test_a_skill_is_handed_from_one_robot_to_another(tmp_path: Path) -> None:
     live.load_skill(0, TorqueLibrary.load(tmp_path / "skill.npz"))
     assert calf(live.stride(6)[0]) < 0.5 * naive
     assert learned < 0.5 * naive
-    skill = live.skill(0)
-    wrong = TorqueLibrary(skill.speeds, skill.torque[..., :6], skill.spread[..., :6], skill.flight)
+    few = np.zeros((1, 2, 161, 6))
+    wrong = TorqueLibrary(np.zeros(1), few, few, np.ones(1))
     with pytest.raises(InvalidInput, match="load one that it has learned"):
         live.load_skill(0, wrong)
 
@@ -199,6 +199,26 @@ def test_a_recording_is_a_results_folder(tmp_path: Path) -> None:
         assert kept["commanded"][0, -1] == pytest.approx(0.2)
     assert set(again.summary()["controller"]) == {"pd", "ilc"}
     live.set_mismatches({"payload": 1.0})  # which may change again
+
+
+def test_a_recording_ends_where_there_is_no_more_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_robot, "LONGEST_RECORDING", 3.0)
+    live = session("pd")
+    strides(live, 30)  # more than there is room for, which nobody reads
+    live.record(tmp_path / "drive")
+    told = strides(live, 40)
+    results = live.save()
+    kept = results.strides(results.find(controller="pd"))
+    count = int(kept["count"][0])
+    assert 3.0 < float(kept["start"][0, count - 1]) < 10.0
+    first = [stride.speed for stride in told[:count]]
+    np.testing.assert_allclose(kept["mean_speed"][0, :count], first)
+    assert told[-1].number == 69, "the session's own numbers go on"
+    times = np.diff([stride.time for stride in told])
+    assert times.min() > 0.3
+    assert times.max() < 0.4
 
 
 def wait_for(condition: Callable[[], bool], seconds: float = 20.0) -> None:
