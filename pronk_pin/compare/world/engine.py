@@ -13,8 +13,8 @@
 
 Outside the engine, the same for all of them: delays, speed-torque curves and sensors. Inside it is
 the rest of a scenario: rotors, damping and dry friction, torque constants (which act on what limits
-have left of a torque), payload, slope, contact, and pushes: those of the scenario (`push_force`, for
-which a state needs its time), and those that are asked for (`World.push`, which an engine may
+have left of a torque), payload, slope, contact, and pushes: those of the scenario (`push_force`,
+for which a state needs its time), and those that are asked for (`World.push`, which an engine may
 refuse). The suite
 `tests/compare/world/test_engines.py` holds any engine to these promises.
 """

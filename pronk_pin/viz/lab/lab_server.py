@@ -18,11 +18,9 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from string import Template
-from typing import Any, cast
+from typing import Any
 
 import msgspec
-import tornado.web
-import tornado.websocket
 from tornado.httputil import HTTPServerRequest
 
 from ..._checks import path as known_path
@@ -46,6 +44,7 @@ from .lab_messages import (
     obey,
     read_message,
 )
+from .lab_pages import Control, Skill
 from .lab_scene import Treadmill, lab_scene
 
 FPS = 50.0
@@ -53,15 +52,6 @@ FPS = 50.0
 
 KEPT = 300
 """Strides of each robot that a page which comes late is told."""
-
-_MOST = 60
-"""Messages a second that a page may send."""
-
-_BEHIND = 400
-"""Messages that wait for a page before it is left."""
-
-_SKILL = 32_000_000
-"""Largest file of a skill [bytes]."""
 
 _PING = 10.0
 """Time after which a page that says nothing is asked whether it is there [s]."""
@@ -100,7 +90,7 @@ class LabServer(LiveServer):
     ) -> None:
         self.session, self._folder = session, folder
         self._token = secrets.token_urlsafe(16)
-        self._pages_that_ask: list[_Control] = []
+        self._pages_that_ask: list[Control] = []
         self._moments: list[Moment | None] = [None] * len(session.robots)
         self._strides: list[deque[dict[str, Any]]] = [deque(maxlen=KEPT) for _ in session.robots]
         self._events: deque[dict[str, Any]] = deque(maxlen=KEPT)
@@ -134,7 +124,8 @@ class LabServer(LiveServer):
         self._moments[robot] = moment
 
     def _finished(self, robot: int, stride: LiveStride) -> None:
-        told = stride._asdict()
+        name = self.session.robots[robot].controller.name  # on its thread: that of the stride
+        told = {**stride._asdict(), "color": look(name).color}
         if stride.number == 0:
             self._strides[robot].clear()
         self._strides[robot].append(told)
@@ -295,8 +286,8 @@ class LabServer(LiveServer):
         return [
             *super().routes(),
             ("/lab.js", Bytes, text_as_bytes(script, SCRIPT)),
-            ("/lab", _Control, {"server": self}),
-            ("/skill", _Skill, {"server": self}),
+            ("/lab", Control, {"server": self}),
+            ("/skill", Skill, {"server": self}),
         ]
 
     def settings(self) -> dict[str, Any]:
@@ -306,112 +297,20 @@ class LabServer(LiveServer):
             "websocket_ping_interval": _PING,
         }
 
-    def drives(self, page: _Control) -> bool:
+    def drives(self, page: Control) -> bool:
         """Whether a page may ask: the one that has been open the longest."""
         return bool(self._pages_that_ask) and self._pages_that_ask[0] is page
 
-    def join(self, page: _Control) -> None:
+    def join(self, page: Control) -> None:
         """Let a page look on, and drive if there is no other."""
         self._pages_that_ask.append(page)
 
-    def leave(self, page: _Control) -> None:
+    def leave(self, page: Control) -> None:
         """A page is gone: the next one drives."""
         if page in self._pages_that_ask:
             self._pages_that_ask.remove(page)
         for each in self._pages_that_ask[:1]:
             each.tell(msgspec.json.encode({"driving": True}))
-
-
-class _Control(tornado.websocket.WebSocketHandler):
-    """The connection over which a page asks, and is told what happens."""
-
-    def initialize(self, server: LabServer) -> None:
-        self._server = server
-        self._waiting: deque[bytes] = deque()
-        self._sending: asyncio.Task[None] | None = None
-        self._second, self._count = 0, 0
-
-    def check_origin(self, origin: str) -> bool:
-        """Whether a page of that origin may ask; `LabServer.refuses` has looked already."""
-        return not self._server.refuses(self.request)
-
-    def open(self, *args: str, **kwargs: str) -> None:
-        self.set_nodelay(True)
-        self._server.join(self)
-        hello = {**self._server.greeting(), "driving": self._server.drives(self)}
-        self.tell(msgspec.json.encode(hello))
-
-    def on_close(self) -> None:
-        self._server.leave(self)
-
-    async def on_message(self, message: str | bytes) -> None:
-        """Do what the page asks, if it is the one that drives."""
-        second = int(time.monotonic())
-        self._count = self._count + 1 if second == self._second else 1
-        self._second = second
-        if not self._server.drives(self):
-            answer = {"refused": "Another page drives; this one watches until that one is closed."}
-        elif self._count > _MOST:
-            answer = {"refused": f"More than {_MOST} messages a second; wait a little."}
-        else:
-            answer = await self._server.ask(message)
-        if answer:
-            self.tell(msgspec.json.encode(answer))
-
-    def tell(self, data: bytes) -> None:
-        """Send a message after those that wait; a page that takes none is left."""
-        self._waiting.append(data)
-        if len(self._waiting) > _BEHIND:
-            self._waiting.clear()
-            self.close()
-        elif self._sending is None or self._sending.done():
-            self._sending = asyncio.ensure_future(self._send())
-
-    async def _send(self) -> None:
-        with contextlib.suppress(tornado.websocket.WebSocketClosedError):
-            while self._waiting:
-                await self.write_message(self._waiting.popleft().decode())
-
-
-class _Skill(tornado.web.RequestHandler):
-    """Answers with a robot's skill as a file, and takes one."""
-
-    def initialize(self, server: LabServer) -> None:
-        self._server = server
-
-    async def get(self) -> None:
-        """Its file."""
-        data = await self._aside(lambda: self._server.save_skill(self._robot()))
-        if data is not None:
-            self.set_header("Content-Type", "application/octet-stream")
-            self.set_header("Content-Disposition", 'attachment; filename="skill.npz"')
-            self.set_header("Cache-Control", "no-store")
-            self.write(cast("bytes", data))
-
-    async def post(self) -> None:
-        """Take one, if a page of ours sends it."""
-        if "Origin" not in self.request.headers or len(self.request.body) > _SKILL:
-            self.set_status(403)
-            return
-        body = self.request.body
-        await self._aside(lambda: self._server.load_skill(self._robot(), body))
-
-    def _robot(self) -> int:
-        try:
-            return int(self.get_query_argument("robot", "0"))
-        except ValueError:
-            raise InvalidInput("robot is no number; load the page again") from None
-
-    async def _aside(self, do: Callable[[], object]) -> object:
-        """Do something aside from the pages; what is wrong is told."""
-        loop, worker = asyncio.get_running_loop(), self._server._worker
-        try:
-            return await loop.run_in_executor(worker, do)
-        except PronkError as error:
-            self.set_status(400)
-            self.set_header("Content-Type", "text/plain; charset=utf-8")
-            self.write(str(error))
-            return None
 
 
 def known_folder(folder: Path | str | None) -> Path | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -219,6 +220,20 @@ def test_a_recording_ends_where_there_is_no_more_room(
     times = np.diff([stride.time for stride in told])
     assert times.min() > 0.3
     assert times.max() < 0.4
+
+
+@pytest.mark.slow
+def test_ten_minutes_take_no_more_memory_than_three() -> None:
+    live = session("ilc")
+    live.set_learning(True)
+    done = strides(live, 500)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    while done[-1].time < 600.0:
+        live.set_mismatches({"payload": 3.0 if done[-1].number % 2 else 1.0})
+        done = strides(live, 100)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 8_000  # [kB]
+    assert done[-1].upright
+    assert calf(done) < 0.05
 
 
 def wait_for(condition: Callable[[], bool], seconds: float = 20.0) -> None:

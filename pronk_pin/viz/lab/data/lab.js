@@ -5,7 +5,7 @@
 const SHOWN = 48;          // strides in a chart
 const PUSHED_MS = 450;     // how long the arrow of a push stands
 const PER_METRE = 25;      // N s for each metre that the trunk is dragged
-const PUSH_COLOR = 0x0072b2;
+const PUSH_COLOR = 0xd6006c;
 const STYLE = `
   #lab { display: grid; gap: 8px; margin-bottom: 10px; }
   #lab fieldset { border: 1px solid #ddd; border-radius: 4px; margin: 0; padding: 4px 8px 6px; min-width: 0; }
@@ -29,7 +29,7 @@ const STYLE = `
   #live-clock { flex: 1; text-align: right; font-variant-numeric: tabular-nums; color: #555; font-size: 12px; }
   #plots, #side > label, #track, #run, #clock, #rate, #play { display: none !important; }
   #side > label:has(#colour) { display: flex !important; }
-  .watching #lab :is(button, input, select), .watching #bar button:not(#drawer) { pointer-events: none; opacity: 0.45; }
+  .watching #lab :is(button, input, select), .watching #bar :is(button:not(#drawer), select) { pointer-events: none; opacity: 0.45; }
   @media (max-width: 640px) {
     #charts { grid-template-columns: 1fr 1fr; }
     #charts canvas { height: 62px; }
@@ -81,8 +81,8 @@ class Chart {
     const bars = robots.map((robot, k) => k).filter((k) => !models.includes(k));
     const group = (width - left) / SHOWN, bar = Math.max((group - 1) / Math.max(bars.length, 1), 1);
     bars.forEach((k, place) => {
-      pen.fillStyle = robots[k].color;
       shown[k].forEach((stride, i) => {
+        pen.fillStyle = stride.color;
         const x = left + group * (SHOWN - shown[k].length + i) + bar * place, v = this.of(stride);
         if (Number.isFinite(v)) pen.fillRect(x, Math.min(y(0), y(v)), bar, Math.max(Math.abs(y(v) - y(0)), 0.5));
       });
@@ -97,14 +97,17 @@ class Chart {
       pen.fillText("the model's level", left + 3, Math.max(y(mean) - 7, 8));
     }
     pen.lineWidth = 1.2;
-    for (const {robot, time, color, words} of marks) {
+    const told = new Set();
+    for (const {robot, time, color, words, row} of marks) {
       const kept = shown[robot], at = kept.findIndex((stride) => stride.time > time);
       if (at < 0 || (at === 0 && strides[robot].length > SHOWN)) continue;
       const x = left + group * (SHOWN - kept.length + at);
       pen.strokeStyle = pen.fillStyle = color;
       line(pen, [[x, 0], [x, height]]);
+      if (told.has(`${Math.round(x)} ${row}`)) continue;  // of another robot
+      told.add(`${Math.round(x)} ${row}`);
       pen.textAlign = x > width - 70 ? "right" : "left";
-      pen.fillText(words, x + (x > width - 70 ? -3 : 3), 8);
+      pen.fillText(words, x + (x > width - 70 ? -3 : 3), 7 + 11 * row);
     }
     const last = bars.map((k) => shown[k].at(-1)).filter(Boolean).map((s) => this.of(s));
     const words = last.map((v) => (Number.isFinite(v) ? v.toFixed(Math.abs(v) < 10 ? 1 : 0) : "-")).join(" / ");
@@ -195,6 +198,7 @@ class Lab {
     for (const [robot, stride] of message.strides || []) {
       const kept = this.strides[robot] = this.strides[robot] || [];
       if (stride.number === 0) kept.length = 0;
+      else if (kept.length && stride.number <= kept.at(-1).number) continue;  // told twice at first
       kept.push(stride); this.counts.strides += 1;
       if (kept.length > 400) kept.shift();
     }
@@ -354,7 +358,7 @@ class Lab {
         const meant = event.robot === null || event.robot === undefined || event.robot === k;
         if (!meant || (learns ? !robot.learns : k !== robots.length - 1)) return;
         marks.push({robot: k, time: event.time[k], color: learns ? "#d55e00" : "#8a4f7d",
-                    words: learns ? (event.on ? "learning" : "off") : "world"});
+                    words: learns ? (event.on ? "learning" : "off") : "world", row: learns ? 0 : 1});
       });
     }
     this.charts.forEach((chart) => chart.draw(this.strides, robots, marks));
@@ -371,8 +375,10 @@ class Lab {
   arrowOf(k) {
     this.pushArrows = this.pushArrows || new Map();
     if (!this.pushArrows.has(k)) {
-      const arrow = new THREE.Mesh(ARROW, new THREE.MeshBasicMaterial({color: PUSH_COLOR}));
-      arrow.name = "push";
+      // Seen through the trunk that it ends in.
+      const arrow = new THREE.Mesh(ARROW, new THREE.MeshBasicMaterial({color: PUSH_COLOR,
+        depthTest: false, transparent: true, opacity: 0.9}));
+      arrow.name = "push"; arrow.renderOrder = 9;
       player.world.add(arrow);
       this.pushArrows.set(k, arrow);
     }
@@ -386,7 +392,7 @@ class Lab {
     if (!size || !this.trunk(k)) return;
     way.divideScalar(size);
     const length = Math.max(size / PER_METRE, 0.08);
-    arrow.scale.set(3, 3, length);
+    arrow.scale.set(2, 2, length);
     arrow.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), way);
     arrow.position.copy(this.trunk(k).position).addScaledVector(way, -length);
   }
