@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
@@ -29,6 +28,7 @@ from ...errors import InvalidInput
 from ...gait import GaitLibrary
 from ...robot import Robot
 from ..experiment import feedforward_by_speed
+from ..metrics import feedback_share
 from ..simulation import Schedule, Simulation, to_dataset
 from ..world import Scenario
 
@@ -79,7 +79,7 @@ class LiveStride(NamedTuple):
     thigh: float
     """That of the thighs [rad]."""
     feedback_share: float
-    """Share of the feedback in the torques: RMS of feedback over that of both."""
+    """Feedback's share of the torque in stance, as in `compare.metrics`."""
     touchdown: float
     """Time by which the touchdown came later than its reference [s]."""
     speed: float
@@ -236,15 +236,15 @@ class LiveRobot:
         at = 0, int(log.count[0]) - 1
         peak = log["peak_error"][at]
         calf, thigh = (float(peak[kind].mean()) for kind in (self._kinds[2], self._kinds[1]))
-        feedback, feedforward = log["feedback"][at], log["feedforward"][at]
-        both = math.sqrt(float(np.mean((feedback + feedforward) ** 2)))
+        torques = {name: log[name][at][0] for name in ("feedback", "feedforward")}
+        stance = xr.Dataset({name: (("phase", "joint"), part) for name, part in torques.items()})
         flight = log["duration"][at] - log["stance"][at]
         return LiveStride(
             number=self.stride_count - 1,
             time=self.time,
             calf=calf,
             thigh=thigh,
-            feedback_share=math.sqrt(float(np.mean(feedback**2))) / both if both else 0.0,
+            feedback_share=feedback_share(stance),
             touchdown=float(flight - log["flight_reference"][at]),
             speed=float(log["mean_speed"][at]),
             commanded=float(log["commanded"][at]),
