@@ -24,6 +24,7 @@ import msgspec
 from tornado.httputil import HTTPServerRequest
 
 from ..._checks import path as known_path
+from ..._checks import real
 from ...compare.session import IMPULSE, LIVE_CONTROLLERS, RATES, LiveSession, LiveStride, Moment
 from ...control import TorqueLibrary
 from ...errors import InvalidInput, PronkError
@@ -88,6 +89,7 @@ class LabServer(LiveServer):
         rate: float = 1.0,
         folder: Callable[[], Path],
     ) -> None:
+        rate = real("rate", rate, RATES)  # before anything is begun
         self.session, self._folder = session, folder
         self._token = secrets.token_urlsafe(16)
         self._pages_that_ask: list[Control] = []
