@@ -242,7 +242,6 @@ CONTROLLERS = {
     for spec in (
         ControllerSpec("pd"),
         _ILC,
-        _ILC_FAST,
         ControllerSpec("model", source="model", knows=_URDF),
         ControllerSpec("library", source="library", timing=FlightTiming()),
         replace(_ILC, name="model+ilc", source="model", knows=_URDF),
@@ -251,6 +250,7 @@ CONTROLLERS = {
         ControllerSpec("ilc-paper", law=PaperILC()),
         ControllerSpec("ilc-paper-exact", law=PaperILC(filter=ZeroPhaseFilter.butterworth(3, 0.1))),
         ControllerSpec("ilc-current", law=CurrentIterationILC()),
+        _ILC_FAST,
         ControllerSpec("identified", source="identified", knows=_IDENTIFIED),
         ControllerSpec(
             "identified+gait",

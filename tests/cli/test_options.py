@@ -495,6 +495,7 @@ def test_a_folder_that_is_there_goes_on_with_its_own_experiment(
 @pytest.mark.parametrize(
     "case",
     [
+        experiment("speeds", (0.1, 0.3), "--speeds 0.1 0.3"),
         experiment("seeds", (3, 4), "--seeds 3 4"),
         argument("workers", 2, "--workers 2"),
         Case("--folder mine", lambda given: Path(given["folder"]), Path("mine")),
@@ -509,7 +510,7 @@ def test_an_option_of_reproduce_reaches_the_run(
     assert case.found(given) == case.value
     assert case.found(arguments(["reproduce"], target)) != case.value
     assert asked(given).controller_names[0] == "pd"
-    assert options_of(Reproduce) == {"folder", "seeds", "workers"}
+    assert options_of(Reproduce) == {"folder", "speeds", "seeds", "workers"}
 
 
 def test_what_is_reproduced_are_the_learners_of_the_suite(

@@ -15,6 +15,7 @@ import xarray as xr
 
 from ..._checks import Interval, flag, instance_of, known_name, whole
 from ..._typing import Array, BoolArray, IntArray
+from ..._workers import count_steps
 from ...control import (
     Controller,
     ControllerSpec,
@@ -212,19 +213,21 @@ class Simulation:
         """Simulate to the end of the schedule.
 
         Args:
-            progress: Called with the number of steps done since the last call.
+            progress: Called with the number of steps done since the last call; by default whoever
+                listens to this process (`_workers.listening`) is told.
             before_stride: Called with the robots that are about to begin a stride, each as often.
         """
         schedule = self.schedule
         steps = round((schedule.baseline + schedule.learning) / self._dt)
         done, lock = 0, threading.Lock()
+        tell = self._count if progress is None else progress
 
         def report() -> None:
             nonlocal done
             with lock:
                 before, done = done, min(int(self._clock.mean()), steps)
-                if progress is not None and done > before:
-                    progress(done - before)
+                if done > before:
+                    tell(done - before)
 
         def strides(rows: IntArray) -> None:
             while (going := rows[self._clock[rows] < steps]).size:
@@ -240,10 +243,12 @@ class Simulation:
             shares = np.array_split(np.arange(len(self._gaits)), self._threads)
             side_by_side = pool.map if self._threads > 1 else map
             list(side_by_side(strides, shares))  # an error in a thread is raised here
-        if progress is not None:
-            progress(steps - done)
+        tell(steps - done)
         self.strides.finish(self.upright)
         return self.strides
+
+    def _count(self, steps: int) -> None:
+        count_steps(steps * len(self._gaits))
 
     @property
     def control_time(self) -> ControlTime:

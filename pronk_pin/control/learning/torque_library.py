@@ -29,7 +29,7 @@ LANDS_ALIKE = 5e-4
 sensed at whole milliseconds."""
 _ROUNDING = 1e-6
 _STORED = ("speeds", "torque", "spread", "flight", "feedback")
-_AGAIN = "learn again, and save it with TorqueLibrary.save"
+_AGAIN = "learn again: pronk-pin ilc build-library, or TorqueLibrary.save"
 
 
 class InitialFeedforward(NamedTuple):
