@@ -127,7 +127,7 @@ class Lab {
     this.settings = settings;
     this.token = new URLSearchParams(location.search).get("token") || "";
     this.strides = []; this.events = []; this.state = {robots: []}; this.driving = false;
-    this.counts = {frames: 0, strides: 0};
+    this.counts = {frames: 0, strides: 0, arrows: 0};  // what was drawn, and told
     document.head.append(make("style", {textContent: STYLE}));
     this.charts = [
       new Chart("calf error", "mrad", "calf", 1000), new Chart("thigh error", "mrad", "thigh", 1000),
@@ -409,10 +409,9 @@ class Lab {
   arrows() {
     for (const [k, {impulse, until}] of this.pushes || []) {
       if (performance.now() > until) { this.arrowOf(k).visible = false; this.pushes.delete(k); }
-      else this.point(k, impulse);
+      else { this.point(k, impulse); this.counts.arrows += 1; }
     }
     if (this.drag) this.point(this.drag.robot, this.drag.impulse);
-    this.counts.arrows = (this.pushes ? this.pushes.size : 0) + (this.drag ? 1 : 0);
     player.rendering = true;
   }
 
