@@ -34,6 +34,7 @@ from pronk_pin.cli.ilc import (
     Wander,
 )
 from pronk_pin.cli.parity import Parity
+from pronk_pin.cli.play import Play
 from pronk_pin.cli.view import FilmOptions, View
 from pronk_pin.compare import Experiment, MujocoEngine, Results, Schedule, run_experiment
 from pronk_pin.compare.experiment import load_suite
@@ -830,6 +831,56 @@ def test_an_option_of_films_reaches_picture_and_film(
         assert given["path"] == Path(path.split()[1])
         without = arguments(["view", *path.split()], f"pronk_pin.viz.{target}")
         assert getattr(without["film"], option) != value
+
+
+def of_experiment(name: str, value: object, words: str) -> Case:
+    """An option that is an attribute of the experiment."""
+    return Case(words, lambda given: getattr(given["experiment"], name), value)
+
+
+PLAY = {
+    "controllers": of_experiment("controllers", ("pd", "ilc"), "--controllers pd ilc"),
+    "scenario": of_experiment("scenarios", ("payload=2",), "--scenario payload=2"),
+    "robot": of_experiment("robot", "go2", "--robot go2"),
+    "gaits": Case("--gaits GAITS", lambda given: len(given["experiment"].library.speeds), 12),
+    "seed": of_experiment("seeds", (3,), "--seed 3"),
+    "speed": argument("speed", 0.2, "--speed 0.2"),
+    "rate": argument("rate", 0.5, "--rate 0.5"),
+    "folder": argument("folder", Path("drive"), "--folder drive"),
+    "port": argument("port", 7123, "--port 7123"),
+    "host": argument("host", "localhost", "--host localhost"),
+}
+SERVED_LAB = {
+    "open": argument("open_browser", False, "--no-open"),
+    "duration": argument("duration", 7.0, "--duration 7"),
+}
+
+
+@pytest.mark.parametrize("option", PLAY)
+def test_an_option_of_play_reaches_the_session(
+    option: str, arguments: Callable[..., Arguments], tmp_path: Path
+) -> None:
+    case = PLAY[option]
+    some_gaits(tmp_path / "gaits.npz", 0, 12)
+    words = case.words.replace("GAITS", str(tmp_path / "gaits.npz")).split()
+    given = arguments(["play", *words], "pronk_pin.viz.live_lab")
+    assert case.found(given) == case.value
+    assert case.found(arguments(["play"], "pronk_pin.viz.live_lab")) != case.value
+
+
+@pytest.mark.parametrize("option", SERVED_LAB)
+def test_an_option_of_play_reaches_its_page(
+    option: str, arguments: Callable[..., Arguments], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pronk_pin.viz.live_lab", lambda *_, **__: None)
+    case = SERVED_LAB[option]
+    given = arguments(["play", *case.words.split()], "pronk_pin.viz.serve_lab")
+    assert case.found(given) == case.value
+    assert case.found(arguments(["play"], "pronk_pin.viz.serve_lab")) != case.value
+
+
+def test_every_option_of_play_has_its_case() -> None:
+    assert {*PLAY, *SERVED_LAB} == options_of(Play)
 
 
 def test_every_option_of_view_has_its_case() -> None:

@@ -4,7 +4,7 @@ Comes in: robot, speeds, controllers, scenarios and seeds, or the name of a suit
 Goes out: an `Experiment`, its cells and their definition, and the strides of a cell.
 """
 
-from .cell import Cell, check_stored_library, run_cell
+from .cell import Cell, check_stored_library, run_cell, strides_attributes
 from .definition import Definition, cell_definition, define, differences, fingerprint
 from .description import describe
 from .entries import name_of
@@ -42,6 +42,7 @@ __all__ = [
     "name_of",
     "read_config",
     "run_cell",
+    "strides_attributes",
     "to_document",
     "torque_library",
 ]

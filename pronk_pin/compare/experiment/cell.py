@@ -190,7 +190,7 @@ def run_cell(
         rng=np.random.default_rng(np.random.SeedSequence(cell.seed)),
         initial=initial,
         base=base,
-        attributes=_attributes(cell),
+        attributes=strides_attributes(cell),
         progress=progress,
         control_time=control_time,
         command=command,
@@ -208,7 +208,8 @@ def _command(cell: Cell, gaits: Sequence[Gait], torque: TorqueLibrary | None) ->
     )
 
 
-def _attributes(cell: Cell) -> dict[str, str | int | float]:
+def strides_attributes(cell: Cell) -> dict[str, str | int | float]:
+    """Attributes of a cell's strides: what they are of, and its fingerprint."""
     experiment, scenario = cell.experiment, cell.world
     definition = cell_definition(define(cell.alone), cell)
     return {
