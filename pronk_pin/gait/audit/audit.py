@@ -166,11 +166,11 @@ def _symmetry(solution: GaitSolution) -> Check:
 
 def _apex(solution: GaitSolution) -> Check:
     """Error of the apex [m]: the trunk's greatest height in flight, between the nodes too, or, with
-    several flights, its height in the middle of each."""
-    flights, errors = [phase for phase in solution.gait.phases if not phase.feet], []
-    for phase in flights:
+    several flights or none, its height in the middle of each or of the first phase."""
+    topped, errors = [phase.name for phase in solution.problem.topped], []
+    for phase in (phase for phase in solution.gait.phases if phase.name in topped):
         height = phase.base_reference(np.linspace(0.0, 1.0, 1001))[0][:, 1]
-        single = len(flights) == 1 and solution.problem.base != "free"
+        single = len(topped) == 1 and solution.problem.base != "free"
         top = float(np.max(height) if single else height[len(height) // 2])
         errors.append((abs(top - solution.problem.apex), phase.name))
     return Check.of("apex error", *max(errors))

@@ -26,7 +26,7 @@ def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
         for phase in problem.sequence
     ]
     flights = [t for phase, t in zip(problem.sequence, durations, strict=True) if not phase.stands]
-    flight = float(np.mean(flights))
+    flight = float(np.mean(flights)) if flights else 0.0
     rise = robot.gravity * flight**2 / 8
     legs = 1 if problem.base == "free" else 2  # of each that the model keeps
     load = sum(legs * len(p.stands) * t for p, t in zip(problem.sequence, durations, strict=True))

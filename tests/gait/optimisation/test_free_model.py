@@ -69,6 +69,27 @@ def test_the_other_half_of_a_trot_is_on_the_other_diagonal(robot: Robot) -> None
     }
 
 
+def test_trot_of_the_robot_as_it_is_needs_no_guide_and_keeps_off_its_limits(robot: Robot) -> None:
+    """Residual of all 18 rows with Pinocchio's model, whose trunk is not its own mirror image."""
+    library = load_library("a1", gait="trot")
+    for gait, audit in zip(library.gaits, library.audit, strict=True):
+        assert audit.passed
+        assert audit["guide"].value < 1e-8
+        assert audit["velocity use"].value < 0.5
+        assert audit["torque use"].value < 0.5
+        base = np.concatenate([p.base_reference(np.linspace(0, 1, 51))[0] for p in gait.phases])
+        assert np.max(np.abs(base[:, [2, 4, 5]])) < 0.06  # pitch, roll, yaw
+
+
+def test_trots_of_all_speeds_are_one_family(robot: Robot) -> None:
+    """Between two gaits, the mean of both almost obeys the equations of motion."""
+    library = load_library("a1", gait="trot")
+    for speed in (library.speeds[:-1] + library.speeds[1:]) / 2.0:
+        residual = library.residual(float(speed), robot=robot)
+        assert residual.force < 0.01 * robot.mass * robot.gravity
+        assert residual.height < 1e-4
+
+
 def test_pronking_on_a_free_trunk_is_refused(robot: Robot) -> None:
     with pytest.raises(UnknownName, match="choose one of: locked, sagittal"):
         gait_problem(robot, 0.5, base="free")
