@@ -136,6 +136,19 @@ TROT = (
 """Diagonal legs in turn, named for the front leg that stands, with a flight after each."""
 
 
+WALK = tuple(
+    ContactPhase(
+        f"{swings} swing",
+        tuple(place for place in PLACES if place != swings),
+        (0.12, 0.2),
+        intervals=8,
+        order=9,
+    )
+    for swings in ("rear left", "front left", "rear right", "front right")
+)
+"""One leg after another swings, the front one after the rear one of its side, as animals walk."""
+
+
 @dataclass(frozen=True)
 class FreeTrunk:
     """What a gait without mirror symmetry asks of its trunk, which moves along and about all axes.
@@ -317,6 +330,16 @@ class GaitProblem:
         """The pairs whose feet touch down where the phase of an index begins."""
         before = self.before(index).stands
         return tuple(pair for pair in self.sequence[index].stands if pair not in before)
+
+    def impacts(self, index: int) -> bool:
+        """Whether feet touch down with an impact where the phase of an index begins.
+
+        On a free trunk they come to rest first where others stand already: an impact would pull at
+        those, and no ground does that.
+        """
+        landing = self.landing(index)
+        alone = set(landing) == set(self.sequence[index].stands)
+        return bool(landing) and (alone or self.base != "free")
 
     def options(self) -> dict[str, Any]:
         """Everything but the robot, speed and apex, as JSON can hold it."""

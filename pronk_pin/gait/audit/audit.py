@@ -216,6 +216,8 @@ def _drifts(solution: GaitSolution) -> tuple[_PhaseDrift, _PhaseDrift]:
 
     def worst(standing: bool) -> _PhaseDrift:
         group = {phase.name: d for phase, d in drifts.items() if bool(phase.stands) == standing}
+        if not group:
+            return _PhaseDrift(0.0, "no flight", 0.0, "no flight")
         joints = max((d.joints.value, _place(name, d.joints.time)) for name, d in group.items())
         feet = max((d.feet.value, _place(name, d.feet.time)) for name, d in group.items())
         return _PhaseDrift(*joints, *feet)

@@ -149,7 +149,7 @@ def _unknowns(problem: GaitProblem, model: FoldedModel) -> dict[str, Unknown]:
         unknowns[f"{name}.duration"] = Unknown(
             name, symbol, shortest, longest, ("phase durations",)
         )
-        if problem.landing(index):
+        if problem.impacts(index):
             symbol = ca.SX.sym(f"{name}_impulse", len(ground))
             impulses[f"{name}.impulse"] = Unknown(f"touchdown of {name}", symbol, *forces)
     return unknowns | impulses
@@ -300,7 +300,8 @@ def _transition(
     phases: Sequence[_Phase],
     index: int,
 ) -> list[Constraint]:
-    """Transition into a phase: continuity, or the plastic impact of the feet that land.
+    """Transition into a phase: continuity, with feet that come to rest on the ground where others
+    stand already, or the plastic impact of the feet that land.
 
     `M (v+ - v-) = J^T impulse` with `J v+ = 0` for all standing feet, and impulses within the
     friction cone.
@@ -316,6 +317,16 @@ def _transition(
     landing = problem.standing(problem.landing(index))
     if not landing:
         return [*constraints, Constraint(name, where, last_v - v)]
+    if not problem.impacts(index):
+        height, velocity, _ = _feet(model, phase, 0, landing)
+        return [
+            *constraints,
+            Constraint(name, where, last_v - v),
+            Constraint(
+                "contact height", f"{phase.name}, node 0", height - problem.robot.foot_radius
+            ),
+            Constraint("touchdown contact", f"touchdown of {phase.name}", velocity),
+        ]
     impulse = ca.SX(3 * len(model.legs), 1)
     for i, leg in enumerate(phase.legs):
         symbol = unknowns[f"{phase.name}.impulse"].symbol
