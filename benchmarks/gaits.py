@@ -1,7 +1,9 @@
 """How fast and how sure the gait optimisation is: `python benchmarks/gaits.py [--crocoddyl]`.
 
 One core. First the 14 gaits from one crude guess, none from its neighbour; then the library warm,
-each from its neighbour; then twenty random starts for each base mode. With `--crocoddyl`, which
+each from its neighbour; then twenty random starts for each base mode. `--free GAIT` does one gait
+on a free trunk instead: from the crude guess, from its neighbour, twenty random starts. With
+`--crocoddyl`, which
 needs `pip install .[bench]`, the nearest problem that Crocoddyl can state, judged by our audit as
 far as it applies: see `benchmarks/gaits_crocoddyl.py`.
 """
@@ -9,6 +11,7 @@ far as it applies: see `benchmarks/gaits_crocoddyl.py`.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import os
 import sys
 import time
@@ -83,7 +86,27 @@ def scattered(problem: GaitProblem, rng: np.random.Generator) -> dict[str, np.nd
     return guess
 
 
-def random_starts(robot: Robot, *, base: str, gait: str = "pronk", speed: float = 0.3) -> None:
+def free_trunk(robot: Robot, gait: str, speed: float) -> None:
+    """A gait on a free trunk, from the crude guess and then from its neighbour."""
+    problem = gait_problem(robot, speed, gait=gait)
+    began = time.perf_counter()
+    first = optimize_gait(problem, diagnose=False)
+    wall = time.perf_counter() - began
+    nearby = dataclasses.replace(problem, speed=speed + 0.1)
+    optimize_gait(problem, initial=first)  # writes the warm solver
+    second = optimize_gait(nearby, initial=first, diagnose=False)
+    print(
+        f"cold     {gait}, {speed:g} m/s: {first.iterations} iterations, {first.solve_time:.1f} s; "
+        f"with its derivatives, which the others share, {wall:.1f} s\n"
+        f"warm     {gait}, {nearby.speed:g} m/s from there: {second.iterations} iterations, "
+        f"{second.solve_time:.1f} s"
+    )
+    random_starts(robot, base=None, gait=gait, speed=speed)
+
+
+def random_starts(
+    robot: Robot, *, base: str | None, gait: str = "pronk", speed: float = 0.3
+) -> None:
     """How many random starts reach the same minimum, the best one."""
     rng = np.random.default_rng(0)
     problem = gait_problem(robot, speed, base=base, gait=gait)  # type: ignore[arg-type]
@@ -98,8 +121,9 @@ def random_starts(robot: Robot, *, base: str, gait: str = "pronk", speed: float 
     same = sum(cost < best * (1 + SAME) for cost in costs)
     others = sorted({round(cost, 2) for cost in costs if best * (1 + SAME) <= cost < np.inf})
     print(
-        f"random   {gait}, {base} base, {speed:g} m/s: {same} of {STARTS} reach the same minimum, "
-        f"cost {best:.3f}; others {others}, not solved {costs.count(np.inf)}; "
+        f"random   {gait}, {base or 'free'} base, {speed:g} m/s: "
+        f"{same} of {STARTS} reach the same minimum, cost {best:.3f}; others {others}, "
+        f"not solved {costs.count(np.inf)}; "
         f"{(time.perf_counter() - began) / STARTS:.1f} s each"
     )
 
@@ -109,8 +133,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--crocoddyl", action="store_true", help="solve it with Crocoddyl too")
     parser.add_argument("--only-crocoddyl", action="store_true", help="and nothing else")
+    parser.add_argument("--free", metavar="GAIT", help="one gait on a free trunk, nothing else")
+    parser.add_argument("--speed", type=float, default=0.4, help="its speed [m/s]")
     options = parser.parse_args()
     robot = load_robot("a1")
+    if options.free:
+        free_trunk(robot, options.free, options.speed)
+        return
     if not options.only_crocoddyl:
         solutions = cold(robot)
         warm(robot)

@@ -128,10 +128,25 @@ BOUND = (
 
 
 TROT = (
-    ContactPhase("left stance", ("front left", "rear right"), (0.14, 0.3), intervals=12, order=10),
-    ContactPhase("left flight", (), (0.04, 0.1), intervals=8, order=7),
+    ContactPhase("left stance", ("front left", "rear right"), (0.16, 0.3), intervals=16, order=11),
+    ContactPhase("left flight", (), (0.04, 0.1), intervals=6, order=7),
+    ContactPhase("right stance", ("front right", "rear left"), (0.16, 0.3), intervals=16, order=11),
+    ContactPhase("right flight", (), (0.04, 0.1), intervals=6, order=7),
 )
-"""Half a stride of a trot, named for the front leg that stands: diagonal legs, then a flight."""
+"""Diagonal legs in turn, named for the front leg that stands, with a flight after each."""
+
+
+WALK = tuple(
+    ContactPhase(
+        f"{swings} swing",
+        tuple(place for place in PLACES if place != swings),
+        (0.12, 0.2),
+        intervals=8,
+        order=9,
+    )
+    for swings in ("rear left", "front left", "rear right", "front right")
+)
+"""One leg after another swings, the front one after the rear one of its side, as animals walk."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +162,11 @@ class FreeTrunk:
         turn_weight: Weight of the rates of roll, pitch and yaw [1/(rad/s)^2].
         drift_weight: Weight of the rates of y and z [1/(m/s)^2]. Without these two the solver
             wanders in a flat valley.
+        tilt_weight: Weight of roll, pitch and yaw [1/rad^2].
+        posture_weight: Weight of the joints' distance from the standing posture [1/rad^2]: it keeps
+            the gaits of all speeds in one family, so that they can be interpolated.
+        impact_weight: Weight of the touchdown impulses [1/(N s)^2]. Free of charge they are used:
+            a foot is hurled at the ground as fast as its joints can.
     """
 
     half_stride: bool = False
@@ -156,6 +176,9 @@ class FreeTrunk:
     side: float = 0.05
     turn_weight: float = 10.0
     drift_weight: float = 100.0
+    tilt_weight: float = 500.0
+    posture_weight: float = 50.0
+    impact_weight: float = 10.0
 
     def __post_init__(self) -> None:
         keep_reals(self, _OF_TRUNK)
@@ -168,6 +191,9 @@ _OF_TRUNK = {
     "side": Interval(0, 10, "m", above=True),
     "turn_weight": Interval(0, 1e6, "1/(rad/s)^2"),
     "drift_weight": Interval(0, 1e6, "1/(m/s)^2"),
+    "tilt_weight": Interval(0, 1e6, "1/rad^2"),
+    "posture_weight": Interval(0, 1e6, "1/rad^2"),
+    "impact_weight": Interval(0, 1e6, "1/(N s)^2"),
 }
 
 
@@ -179,7 +205,7 @@ class GaitProblem:
         robot: The robot.
         speed: Average forward speed of the trunk [m/s].
         apex: Greatest height of the trunk [m]; its height in the middle of each flight, where a
-            stride has several.
+            stride has several, and of its first phase, where it has none.
         base: "locked", the trunk moves along x and z as the paper simulates it, or "sagittal", it
             pitches too; or "free", without mirror symmetry, with single legs in the sequence.
         sequence: The phases of a stride and the feet that stand in each; the last one ends in the
@@ -236,9 +262,9 @@ class GaitProblem:
                 f"{self.trunk_height:g} m; raise the one or lower the other"
             )
         if self.trunk is None:
-            _check_sequence(self.sequence, PAIRS[: len(mirror(self.robot).pairs)])
+            _check_sequence(self.sequence, PAIRS[: len(mirror(self.robot).pairs)], flies=True)
         else:
-            _check_sequence(self.whole_sequence, PLACES)
+            _check_sequence(self.whole_sequence, PLACES, flies=False)
         least, most = (sum(phase.duration[end] for phase in self.whole_sequence) for end in (0, 1))
         if most < self.stride[0] or least > self.stride[1]:
             raise InvalidInput(
@@ -256,6 +282,11 @@ class GaitProblem:
         phases = zip(self.sequence, intervals, strict=True)
         sequence = tuple(dataclasses.replace(phase, intervals=int(n)) for phase, n in phases)
         return dataclasses.replace(self, sequence=sequence)
+
+    @property
+    def topped(self) -> tuple[ContactPhase, ...]:
+        """The phases in which the apex is: the flights, or the first phase where none flies."""
+        return tuple(p for p in self.sequence if not p.stands) or self.sequence[:1]
 
     @property
     def half_stride(self) -> bool:
@@ -299,6 +330,16 @@ class GaitProblem:
         """The pairs whose feet touch down where the phase of an index begins."""
         before = self.before(index).stands
         return tuple(pair for pair in self.sequence[index].stands if pair not in before)
+
+    def impacts(self, index: int) -> bool:
+        """Whether feet touch down with an impact where the phase of an index begins.
+
+        On a free trunk they come to rest first where others stand already: an impact would pull at
+        those, and no ground does that.
+        """
+        landing = self.landing(index)
+        alone = set(landing) == set(self.sequence[index].stands)
+        return bool(landing) and (alone or self.base != "free")
 
     def options(self) -> dict[str, Any]:
         """Everything but the robot, speed and apex, as JSON can hold it."""
@@ -368,13 +409,15 @@ def _check_trunk(base: Base, trunk: FreeTrunk | None, sequence: tuple[ContactPha
                 )
 
 
-def _check_sequence(sequence: tuple[ContactPhase, ...], legs: Sequence[Pair | Place]) -> None:
+def _check_sequence(
+    sequence: tuple[ContactPhase, ...], legs: Sequence[Pair | Place], *, flies: bool
+) -> None:
     names = [phase.name for phase in sequence]
     if len(set(names)) < len(names):
         raise InvalidInput(
             f"two phases of the sequence {', '.join(names)} have the same name; rename one"
         )
-    if all(phase.stands for phase in sequence):
+    if flies and all(phase.stands for phase in sequence):
         raise InvalidInput(
             "the sequence has no flight, so that no apex exists; add a phase of none"
         )

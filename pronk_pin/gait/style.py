@@ -73,10 +73,10 @@ STYLES: Mapping[str, Style] = {
             TROT,
             "free",
             TROT,
-            _speeds(-0.4, 0.8)[::2],
+            _speeds(-0.4, 1.2),
             0.31,
-            (0.36, 0.6),
-            FreeTrunk(half_stride=True),
+            (0.4, 0.6),
+            FreeTrunk(),
             0.4,
         ),
     )
@@ -154,7 +154,8 @@ def gait_problem(
         height = scaled_length(robot, style.trunk.height)
         side = scaled_length(robot, style.trunk.side)
         defaults["trunk"] = replace(style.trunk, height=height, side=side)
-        defaults["hip_limit"] = _SPLAY
+        defaults |= _PLAYABLE
+        defaults["velocity_weight"] *= _CALM
     options, stands = defaults | changes, float(robot.standing[2])
     if not real("apex", options["apex"], Interval(0, 100, "m", above=True)) > stands:
         raise InvalidInput(
@@ -164,8 +165,12 @@ def gait_problem(
     return GaitProblem(robot, speed, **options)
 
 
-_SPLAY = 0.15
-"""Largest hip angle on a free trunk [rad]; its feet balance it sideways."""
+_PLAYABLE = {"hip_limit": 0.15, "pitch_limit": 0.1, "torque_use": 0.8, "velocity_use": 0.8}
+"""What a gait on a free trunk may use: its hips balance it sideways, its trunk stays level, and
+feedback finds room within the limits of the motors."""
+
+_CALM = 2.0
+"""Weight of the joints' velocities on a free trunk, over that in other gaits."""
 
 
 def _of_size(robot: Robot) -> dict[str, float]:

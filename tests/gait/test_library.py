@@ -165,7 +165,7 @@ def test_saving_and_loading_changes_nothing(library: GaitLibrary, tmp_path: Path
 
 
 SHIPPED = [("a1", "pronk", None), ("a1", "pronk", "sagittal"), ("a1", "bound", None)]
-SHIPPED += [("go1", "pronk", None), ("go2", "pronk", None)]
+SHIPPED += [("go1", "pronk", None), ("go2", "pronk", None), ("a1", "trot", None)]
 
 
 @pytest.mark.parametrize(("name", "kind", "base"), SHIPPED)

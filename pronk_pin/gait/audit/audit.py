@@ -166,11 +166,11 @@ def _symmetry(solution: GaitSolution) -> Check:
 
 def _apex(solution: GaitSolution) -> Check:
     """Error of the apex [m]: the trunk's greatest height in flight, between the nodes too, or, with
-    several flights, its height in the middle of each."""
-    flights, errors = [phase for phase in solution.gait.phases if not phase.feet], []
-    for phase in flights:
+    several flights or none, its height in the middle of each or of the first phase."""
+    topped, errors = [phase.name for phase in solution.problem.topped], []
+    for phase in (phase for phase in solution.gait.phases if phase.name in topped):
         height = phase.base_reference(np.linspace(0.0, 1.0, 1001))[0][:, 1]
-        single = len(flights) == 1 and solution.problem.base != "free"
+        single = len(topped) == 1 and solution.problem.base != "free"
         top = float(np.max(height) if single else height[len(height) // 2])
         errors.append((abs(top - solution.problem.apex), phase.name))
     return Check.of("apex error", *max(errors))
@@ -216,6 +216,8 @@ def _drifts(solution: GaitSolution) -> tuple[_PhaseDrift, _PhaseDrift]:
 
     def worst(standing: bool) -> _PhaseDrift:
         group = {phase.name: d for phase, d in drifts.items() if bool(phase.stands) == standing}
+        if not group:
+            return _PhaseDrift(0.0, "no flight", 0.0, "no flight")
         joints = max((d.joints.value, _place(name, d.joints.time)) for name, d in group.items())
         feet = max((d.feet.value, _place(name, d.feet.time)) for name, d in group.items())
         return _PhaseDrift(*joints, *feet)

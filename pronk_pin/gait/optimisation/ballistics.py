@@ -21,7 +21,8 @@ from ..problem import GaitProblem
 def largest_apex(problem: GaitProblem) -> float:
     """Height of the trunk that no flight within its durations exceeds in its middle [m]."""
     robot = problem.robot
-    longest = max(phase.duration[1] for phase in problem.sequence if not phase.stands)
+    flights = [phase.duration[1] for phase in problem.sequence if not phase.stands]
+    longest = max(flights, default=0.0)
     longest = min(longest, problem.stride[1])
     geometry, pitch = leg_geometry(robot), _pitch(problem)
     hip = geometry.hip + geometry.thigh

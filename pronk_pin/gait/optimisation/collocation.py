@@ -24,7 +24,7 @@ import numpy as np
 
 from ..._typing import Array
 from ...kinematics import mirror
-from ...robot import JOINTS
+from ...robot import JOINTS, NB
 from ..problem import ContactPhase, GaitProblem
 from .folded_model import FoldedModel, fold
 from .newton_euler import BASE_COORDINATES
@@ -35,7 +35,11 @@ _FREE = BASE_COORDINATES["free"]
 _TRUNK_LIMITS = ("pitch limit", "side step", "roll limit", "yaw limit")
 
 _TIP = 1e-6
-"""Rounding of the friction cone's tip [N], which keeps its derivative finite."""
+"""Rounding of the friction cone's tip [N, N s], which keeps its derivative finite."""
+
+_BLUNT_TIPS = (0.1, 0.01)
+"""The same on a free trunk, of forces [N] and impulses [N s]. On sharp tips, where forces from the
+crude guess begin, the solver spends two thirds of its iterations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,16 +92,21 @@ def transcribe(problem: GaitProblem) -> Transcription:
     cycle = _cycle(problem, phases)
     for leg in range(len(model.legs)):
         constraints += _swinging(problem, model, cycle, len(phases), leg)
-    flights = [phase for phase in phases if not phase.legs]
-    for phase in flights:
+    topped = [phase.name for phase in problem.topped]
+    for phase in (phase for phase in phases if phase.name in topped):
         # With several flights the trunk pitches through them and may have no top in any.
         middle = phase.q[1, len(phase.s) // 2]
-        top = _apex(phase.s, phase.q[1, :]) if len(flights) == 1 and model.nb < _FREE else middle
+        top = _apex(phase.s, phase.q[1, :]) if len(topped) == 1 and model.nb < _FREE else middle
         constraints.append(Constraint("apex height", phase.name, top - apex))
     constraints += _stride(problem, phases, speed)
     for index in range(len(phases)):
         constraints += _transition(problem, model, unknowns, phases, index)
     cost = sum((_cost(problem, model, phase) for phase in phases), ca.SX(0))
+    if problem.trunk is not None:
+        count = 2.0 if problem.half_stride else 1.0
+        for name, unknown in unknowns.items():
+            if name.endswith(".impulse"):
+                cost += count * problem.trunk.impact_weight * ca.sumsqr(unknown.symbol)
     return Transcription.of(unknowns, ca.vertcat(speed, apex), cost, tuple(constraints))
 
 
@@ -140,7 +149,7 @@ def _unknowns(problem: GaitProblem, model: FoldedModel) -> dict[str, Unknown]:
         unknowns[f"{name}.duration"] = Unknown(
             name, symbol, shortest, longest, ("phase durations",)
         )
-        if problem.landing(index):
+        if problem.impacts(index):
             symbol = ca.SX.sym(f"{name}_impulse", len(ground))
             impulses[f"{name}.impulse"] = Unknown(f"touchdown of {name}", symbol, *forces)
     return unknowns | impulses
@@ -189,12 +198,12 @@ def _feet(
 
 def _standing(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> list[Constraint]:
     """Holonomic constraints (3) of the standing feet, `J a + sigma = 0`, and the friction cone."""
-    constraints = []
+    constraints, tip = [], _BLUNT_TIPS[0] if model.nb == _FREE else _TIP
     for k in range(len(phase.s) if phase.legs else 0):
         where = f"{phase.name}, node {k}"
         acceleration = _feet(model, phase, k, phase.legs)[2]
         constraints.append(Constraint("contact acceleration", where, acceleration))
-        cone = _cone(phase.lam[:, k], phase.legs, problem.friction)
+        cone = _cone(phase.lam[:, k], phase.legs, problem.friction, tip)
         constraints.append(Constraint("friction cone", where, cone, upper=np.inf))
     return constraints
 
@@ -273,7 +282,11 @@ def _stride(problem: GaitProblem, phases: Sequence[_Phase], speed: ca.SX) -> lis
     total = sum((phase.duration for phase in phases), ca.SX(0))
     parts = 2.0 if problem.half_stride else 1.0
     first, last = phases[0].q[0, 0], phases[-1].q[0, -1]
+    # Whole strides on a free trunk may begin anywhere beside the way, too; half a stride may not.
+    whole = problem.trunk is not None and not problem.half_stride
+    beside = [Constraint("periodicity", "stride", phases[0].q[3, 0])] if whole else []
     return [
+        *beside,
         Constraint("stride duration", "stride", parts * total, *problem.stride),
         Constraint("periodicity", "stride", first),  # x may begin anywhere; here it begins at 0
         Constraint("average speed", "stride", last - first - speed * total),
@@ -287,7 +300,8 @@ def _transition(
     phases: Sequence[_Phase],
     index: int,
 ) -> list[Constraint]:
-    """Transition into a phase: continuity, or the plastic impact of the feet that land.
+    """Transition into a phase: continuity, with feet that come to rest on the ground where others
+    stand already, or the plastic impact of the feet that land.
 
     `M (v+ - v-) = J^T impulse` with `J v+ = 0` for all standing feet, and impulses within the
     friction cone.
@@ -303,6 +317,16 @@ def _transition(
     landing = problem.standing(problem.landing(index))
     if not landing:
         return [*constraints, Constraint(name, where, last_v - v)]
+    if not problem.impacts(index):
+        height, velocity, _ = _feet(model, phase, 0, landing)
+        return [
+            *constraints,
+            Constraint(name, where, last_v - v),
+            Constraint(
+                "contact height", f"{phase.name}, node 0", height - problem.robot.foot_radius
+            ),
+            Constraint("touchdown contact", f"touchdown of {phase.name}", velocity),
+        ]
     impulse = ca.SX(3 * len(model.legs), 1)
     for i, leg in enumerate(phase.legs):
         symbol = unknowns[f"{phase.name}.impulse"].symbol
@@ -311,7 +335,8 @@ def _transition(
     height = _feet(model, phase, 0, landing)[0] - problem.robot.foot_radius
     velocity = _feet(model, phase, 0, phase.legs)[1]
     residual = model.impact(q, v - last_v, impulse)
-    cone = _cone(impulse, phase.legs, problem.friction)
+    tip = _BLUNT_TIPS[1] if model.nb == _FREE else _TIP
+    cone = _cone(impulse, phase.legs, problem.friction, tip)
     return [
         *constraints,
         Constraint("contact height", f"{phase.name}, node 0", height),
@@ -321,17 +346,17 @@ def _transition(
     ]
 
 
-def _cone(forces: ca.SX, legs: Sequence[int], friction: float) -> ca.SX:
+def _cone(forces: ca.SX, legs: Sequence[int], friction: float, tip: float) -> ca.SX:
     """Friction cone of each standing foot, mu f_n - |f_t|: not negative where the foot holds."""
     f = ca.reshape(forces, 3, -1)[:, list(legs)]
-    return friction * f[2, :] - ca.sqrt(f[0, :] ** 2 + f[1, :] ** 2 + _TIP**2)
+    return friction * f[2, :] - ca.sqrt(f[0, :] ** 2 + f[1, :] ** 2 + tip**2)
 
 
 def _cost(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> ca.SX:
     """Cost (6) over a phase, `int W_tau |tau|^2 + W_q |q'|^2 dt`, by Simpson's rule.
 
-    The kept legs count twice, and so does half a stride. A free trunk's turning and its motion
-    beside the way cost a little too.
+    The kept legs count twice, and so does half a stride. On a free trunk its turns and tilts, its
+    motion beside the way, and joints far from the standing posture cost something too.
     """
     count = 1.0 if problem.base == "free" and not problem.half_stride else 2.0
     rate = count * (
@@ -342,6 +367,10 @@ def _cost(problem: GaitProblem, model: FoldedModel, phase: _Phase) -> ca.SX:
         turns, strays = phase.v[[2, 4, 5], :], phase.v[[1, 3], :]
         rate += count * problem.trunk.turn_weight * ca.sum1(turns**2)
         rate += count * problem.trunk.drift_weight * ca.sum1(strays**2)
+        rate += count * problem.trunk.tilt_weight * ca.sum1(phase.q[[2, 4, 5], :] ** 2)
+        standing = problem.robot.standing[NB + 1 :][model.joint_rows()]
+        bent = phase.q[model.nb :, :] - ca.repmat(ca.DM(standing), 1, len(phase.s))
+        rate += count * problem.trunk.posture_weight * ca.sum1(bent**2)
     lengths = np.diff(phase.s[::2])
     weights = np.zeros(len(phase.s))
     weights[:-1:2] += lengths / 6

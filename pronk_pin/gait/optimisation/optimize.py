@@ -47,8 +47,8 @@ _COLD = QUIET | {
     "ipopt.adaptive_mu_globalization": "kkt-error",
     "ipopt.mu_init": 0.5,
 }
-_FREE = {"ipopt.mu_init": 1.0}
-"""A free trunk wants a farther start: half the iterations."""
+_FREE = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 0.1}
+"""On a free trunk the monotone barrier takes half the iterations."""
 
 _WARM = _COLD | {
     "ipopt.warm_start_init_point": "yes",
@@ -162,7 +162,7 @@ def _solution(problem: GaitProblem, state: SolverState, run: _Found) -> GaitSolu
     impulses = {
         phase.name: touchdown_impulse(problem, index, motions, values)
         for index, phase in enumerate(problem.sequence)
-        if problem.landing(index)
+        if problem.impacts(index)
     }
     phases = [fitted(problem, phase, motions[phase.name], values) for phase in problem.sequence]
     if problem.half_stride:
@@ -171,7 +171,7 @@ def _solution(problem: GaitProblem, state: SolverState, run: _Found) -> GaitSolu
             image = mirrored_phase(phase).name
             motions[image] = advanced(mirror_image(problem, motions[phase.name]), half)
         for index, phase in enumerate(problem.sequence):
-            if problem.landing(index):
+            if problem.impacts(index):
                 image = mirrored_phase(phase).name
                 partner = list(mirror(problem.robot).partner)
                 impulses[image] = impulses[phase.name][partner] * np.array([1.0, -1.0, 1.0])

@@ -1,4 +1,4 @@
-"""Figures of a gait library: every gait over its stride, and one of them seen from the side."""
+"""Figures of a gait library: every gait over its stride, and one from the side and as a diagram."""
 
 from __future__ import annotations
 
@@ -58,6 +58,7 @@ def write_gait_figures(
     figures = {
         "stride": stride_figure(part, robot),
         "side": side_view(part.at(speed), robot, base=library.base),
+        "diagram": gait_diagram(part.at(speed), robot),
     }
     stem = f"{library.robot}-{library.metadata.get('gait', 'gait')}"
     return [
@@ -151,6 +152,34 @@ def side_view(gait: Gait, robot: Robot, *, base: str = "locked") -> Figure:
         f"of {1e3 * gait.duration:.0f} ms, poses spread out; arrows: ground forces",
         fontsize=9,
     )
+    return figure
+
+
+@styled
+def gait_diagram(gait: Gait, robot: Robot) -> Figure:
+    """The gait diagram (Hildebrand): a row a leg, a bar while its foot stands.
+
+    Each row has its duty factor, the share of the stride that the foot stands.
+
+    Args:
+        gait: The gait.
+        robot: Its robot.
+    """
+    figure = new_figure(5.0, 0.7 + 0.3 * len(robot.legs))
+    axes = figure.subplots()
+    starts = np.append(_starts(gait), gait.duration) / gait.duration
+    for row, leg in enumerate(robot.legs):
+        stands = [(k, leg in phase.feet) for k, phase in enumerate(gait.phases)]
+        bars = [(starts[k], starts[k + 1] - starts[k]) for k, standing in stands if standing]
+        axes.broken_barh(bars, (row - 0.35, 0.7), color="0.25", lw=0)
+        axes.text(1.02, row, f"{sum(width for _, width in bars):.0%}", va="center", fontsize=8)
+    for start in starts[1:-1]:
+        axes.axvline(start, color="0.7", lw=0.6, zorder=0)
+    axes.set_yticks(range(len(robot.legs)), robot.legs)
+    axes.set_ylim(len(robot.legs) - 0.5, -0.5)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xlabel(f"t / stride of {1e3 * gait.duration:.0f} ms")
+    axes.set_title(f"{robot.name.upper()} at {gait.speed:g} m/s: feet on the ground", fontsize=9)
     return figure
 
 

@@ -13,7 +13,7 @@ from pronk_pin.gait import Gait, GaitLibrary, bezier, load_library
 from pronk_pin.kinematics import foot_positions
 from pronk_pin.robot import JOINTS, Robot, length_scale, load_robot
 from pronk_pin.viz.figure_style import ACCENT
-from pronk_pin.viz.figures.gait_figures import side_view, stride_figure
+from pronk_pin.viz.figures.gait_figures import gait_diagram, side_view, stride_figure
 
 COLUMNS = {"front": 0, "rear": 6}
 """First joint of the left legs, FL and RL."""
@@ -183,3 +183,30 @@ def test_legs_in_the_side_view_stand_on_the_ground_where_their_arrows_begin(robo
     standing = sorted(feet.reshape(-1, 2)[feet.reshape(-1, 2)[:, 1] < 0.0201, 0])
     assert set(np.round(starts, 6)) <= set(np.round(standing, 6))
     assert length_scale(robot) == 1.0
+
+
+@pytest.mark.parametrize("name", ["pronk", "bound", "trot"])
+def test_bars_of_the_gait_diagram_lie_where_the_foot_is_on_the_ground(
+    robot: Robot, name: str
+) -> None:
+    """Read back against the motion itself: a foot stands where its height is its radius, and it
+    does not move."""
+    gait = load_library("a1", gait=name).at(0.4)
+    axes = gait_diagram(gait, robot).axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == list(robot.legs)
+    bars = [
+        [path.get_extents().x0 * gait.duration, path.get_extents().x1 * gait.duration, row]
+        for row, collection in enumerate(axes.collections)
+        for path in collection.get_paths()
+    ]
+    begin = 0.0
+    for phase in gait.phases:
+        middle = begin + 0.5 * phase.duration
+        height = foot_positions(robot, phase.motion(robot, np.array([0.5])).q)[0, :, 2]
+        down = {row for first, last, row in bars if first < middle < last}
+        assert down == set(np.flatnonzero(height - robot.foot_radius < 1e-4))
+        begin += phase.duration
+    shares = [float(text.get_text().rstrip("%")) / 100.0 for text in axes.texts]
+    for row, share in enumerate(shares):
+        lasting = sum(last - first for first, last, own in bars if own == row)
+        assert share == pytest.approx(lasting / gait.duration, abs=0.006)
