@@ -30,6 +30,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     source = page.file.src_uri
     if source == "index.md":
         markdown = (ROOT / "README.md").read_text()
+        markdown = re.sub(r"^\[!\[.*\n", "", markdown, flags=re.M)  # badges come from elsewhere
+        markdown = markdown.replace("](examples)", "](gallery.md)")
         markdown = markdown.replace("](docs/", "](").replace("](CONTRIBUTING", "](../CONTRIBUTING")
         markdown = markdown.replace("](CITATION", "](../CITATION")
     markdown = re.sub(r"\]\((?:\.\./)+README\.md", "](index.md", markdown)
