@@ -11,6 +11,8 @@ import numpy as np
 
 from pronk_pin.compare import Experiment, Schedule, run_experiment
 from pronk_pin.control import ControllerSpec, StrideRecord
+from pronk_pin.viz import save_figure
+from pronk_pin.viz.figures import learning_curves
 
 
 @dataclass(frozen=True)
@@ -35,3 +37,5 @@ if __name__ == "__main__":
     results = run_experiment(experiment, *(sys.argv[1:] or ["results/own-law"]), workers=2)
     table = results.summary().query("metric == 'peak_error' and joint in ['thigh', 'calf']")
     print(table.pivot_table(index="controller", columns="joint", values="value").round(4))
+    strides = {name: results.all_strides(controller=name) for name in ("pd", "ilc-stance", "mine")}
+    save_figure(learning_curves(strides), results.folder / "picture.svg")

@@ -6,6 +6,8 @@ from pathlib import Path
 from pronk_pin.compare import Experiment, Schedule, run_experiment
 from pronk_pin.gait import build_library
 from pronk_pin.robot import feedback_gains, load_robot, motor_constants
+from pronk_pin.viz import save_figure
+from pronk_pin.viz.figures import still
 
 SPECIFICATION = """
 name = "anymal_b"
@@ -38,6 +40,9 @@ if __name__ == "__main__":
         controllers=("pd", "model", "ilc"),
         schedule=Schedule(baseline=2.0, learning=8.0),
     )
-    table = run_experiment(experiment, folder, workers=2).summary()
+    results = run_experiment(experiment, folder, workers=2)
+    table = results.summary()
     table = table[table["metric"] == "peak_error"]
     print(table.pivot_table(index="joint", columns="controller", values="value").round(4))
+    figure = still(results.all_strides(controller="ilc"), robot, speed=0.3)
+    save_figure(figure, folder / "picture.svg")

@@ -6,6 +6,9 @@ import numpy as np
 import xarray as xr
 
 from pronk_pin.compare import Experiment, Metric, Scenario, Schedule, run_experiment
+from pronk_pin.compare.report import answer
+from pronk_pin.viz import save_figure
+from pronk_pin.viz.figures import heat_map
 
 warm = Scenario("warm", armature=0.009, damping=0.05, coulomb=0.1, torque_constant=0.95)
 
@@ -28,3 +31,4 @@ if __name__ == "__main__":
     table = table[table["metric"].isin(["peak_error", "hardest_landing"])]
     keys = ["metric", "scenario"]
     print(table.pivot_table(index=keys, columns="controller", values="value").round(4))
+    save_figure(heat_map(answer(results.summary())), results.folder / "picture.svg")

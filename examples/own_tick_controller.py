@@ -11,6 +11,8 @@ import numpy as np
 
 from pronk_pin.compare import Experiment, Schedule, run_experiment
 from pronk_pin.control import ControllerSpec, Observation, SetPoints, load_controller
+from pronk_pin.viz import save_figure
+from pronk_pin.viz.figures import learning_curves
 
 
 @dataclass(frozen=True)
@@ -43,3 +45,5 @@ if __name__ == "__main__":
     table = results.summary().query("metric == 'peak_error' and joint in ['thigh', 'calf']")
     print(table.pivot_table(index="controller", columns="joint", values="value").round(4))
     print({name: f"{time:.1f} us a tick" for name, time in results.control_times.items()})
+    strides = {name: results.all_strides(controller=name) for name in ("pd", "soft", "soft+ilc")}
+    save_figure(learning_curves(strides), results.folder / "picture.svg")

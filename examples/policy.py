@@ -14,6 +14,8 @@ import numpy as np
 
 from pronk_pin.compare import Experiment, Schedule, run_experiment
 from pronk_pin.control import ControllerSpec, Gains, Observation
+from pronk_pin.viz import save_figure
+from pronk_pin.viz.figures import errors_by_speed
 
 
 @dataclass(frozen=True)
@@ -67,3 +69,5 @@ if __name__ == "__main__":
     results = run_experiment(experiment, folder, workers=2)
     table = results.summary().query("metric == 'peak_error' and joint in ['thigh', 'calf']")
     print(table.pivot_table(index="controller", columns="joint", values="value").round(4))
+    figure = errors_by_speed(results.summary(), scenario="nominal")
+    save_figure(figure, folder / "picture.svg")

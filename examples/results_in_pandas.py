@@ -6,6 +6,8 @@ of which what is asked for is read.
 
 import sys
 
+from matplotlib.figure import Figure
+
 from pronk_pin.compare import Experiment, Schedule, run_experiment
 
 if __name__ == "__main__":
@@ -26,3 +28,8 @@ if __name__ == "__main__":
     print(history.iloc[:, ::3].round(3).to_string())
     learned = nominal["feedforward"].sel(controller="ilc", part="stance")
     print(f"largest learned torque {float(abs(learned).max()):.1f} {learned.units}")
+
+    figure = Figure(figsize=(6, 3), layout="constrained")
+    axes = figure.subplots()
+    history.T.plot(ax=axes, ylabel="peak error of the calf [rad]", ylim=(0, None))
+    figure.savefig(results.folder / "picture.svg")

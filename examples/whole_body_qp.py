@@ -8,7 +8,10 @@ import sys
 from dataclasses import replace
 
 from pronk_pin.compare import Experiment, Schedule, run_experiment
+from pronk_pin.compare.report import answer
 from pronk_pin.control import WholeBodyQP, load_controller
+from pronk_pin.viz import save_figure
+from pronk_pin.viz.figures import heat_map
 
 cautious = replace(
     load_controller("whole-body-qp+rotors"),
@@ -27,3 +30,4 @@ if __name__ == "__main__":
     table = results.summary().query("metric == 'peak_error' and joint == 'calf'")
     print(table.pivot_table(index="controller", columns="scenario", values="value").round(4))
     print({name: f"{time:.0f} us a tick" for name, time in results.control_times.items()})
+    save_figure(heat_map(answer(results.summary())), results.folder / "picture.svg")

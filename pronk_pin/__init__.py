@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from .robot import ModelParameters, Robot, RobotSpec, load_robot
 
 __all__ = ["ModelParameters", "PronkError", "Robot", "RobotSpec", "load_robot"]
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _LATER = tuple(name for name in __all__ if name != "PronkError")
 """Names of `robot`, which is imported when they are first asked for (PEP 562): a worker process

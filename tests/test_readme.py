@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import datetime
 import re
 import shlex
 from pathlib import Path
 
 import pytest
 
+import pronk_pin
 from pronk_pin import cli
 
 ROOT = Path(__file__).parents[1]
@@ -59,3 +61,16 @@ def test_links_lead_somewhere(page: Path) -> None:
 def test_the_root_links_lead_into_the_package() -> None:
     for name in ("gait", "control", "compare", "viz"):
         assert (ROOT / name).resolve() == ROOT / "pronk_pin" / name
+
+
+def test_the_version_and_its_date_are_the_same_everywhere() -> None:
+    version = re.search(r'^version = "(.+)"', (ROOT / "pyproject.toml").read_text(), flags=re.M)
+    cited = (ROOT / "CITATION.cff").read_text()
+    assert version is not None
+    assert version[1] == pronk_pin.__version__
+    assert f"version: {version[1]}\n" in cited
+    date = re.search(r'^date-released: "(.+)"', cited, flags=re.M)
+    assert date is not None
+    day = datetime.date.fromisoformat(date[1])
+    heading = f"## {version[1]}, {day.day} {day:%B %Y}"
+    assert heading in (ROOT / "CHANGELOG.md").read_text().splitlines()

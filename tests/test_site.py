@@ -99,6 +99,10 @@ def test_what_the_page_of_the_paper_names_exists() -> None:
 def test_every_page_is_in_the_sites_menu_and_every_room_has_its_page() -> None:
     menu = (ROOT / "mkdocs.yml").read_text()
     pages = {str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md")}
+    # Made when the site is built.
+    notebooks = {path.stem for path in (ROOT / "examples" / "notebooks").glob("*.py")}
+    assert len(notebooks) == 2
+    pages |= {"gallery.md"} | {f"notebooks/{name}.md" for name in notebooks}
     assert set(re.findall(r"(\S+\.md)$", menu, flags=re.M)) == pages
     rooms = {path.parent.name for path in (ROOT / "pronk_pin").glob("*/__init__.py")}
     shown = {path.stem for path in (DOCS / "api").glob("*.md")}
