@@ -367,8 +367,8 @@ class LiveRobot:
         Raises:
             InvalidInput: There is none yet.
         """
-        self._recording = False
-        if self._recorded is None and not self.simulation.strides.count.any():
+        recording, self._recording = self._recording, False  # it begins at a touchdown
+        if not recording or (self._recorded is None and not self.simulation.strides.count.any()):
             raise InvalidInput("no stride was recorded yet; let the robots go on for a second")
         return self._dataset() if self._recorded is None else self._recorded
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
-from contextlib import contextmanager
+from concurrent.futures import Future, wait
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -31,8 +31,8 @@ MOST_ROBOTS = 3
 IMPULSE = Interval(-30.0, 30.0, "N s")
 """What a push can give: the A1 weighs 12.5 kg."""
 
-_WAIT = 60.0
-"""How long is waited for what takes effect at the next touchdown [s]."""
+_LOOK = 0.05
+"""How often who waits for a touchdown looks whether one will come [s]."""
 
 Outcome = TypeVar("Outcome")
 
@@ -72,9 +72,17 @@ class _Seat:
                 except Empty:
                     return
 
+    def pushes_now(self) -> Iterator[Array]:
+        """The pushes asked for so far, which are taken."""
+        with suppress(Empty):
+            while True:
+                yield self.pushes.get_nowait()
+
     def interrupt(self, do: Callable[[], object]) -> None:
-        """Have the robot give up its stride, and something done then."""
+        """Have the robot give up its stride and its pushes, and something done then."""
         with self._lock:
+            for _ in self.pushes_now():
+                pass
             self.asked.put(do)
             self.interrupted.set()
 
@@ -269,10 +277,10 @@ class LiveSession:
             if not self._running:
                 return
             self.clock.wait(moment.time, seat.interrupted)
-            while not seat.pushes.empty():
-                seat.robot.push(seat.pushes.get())
             if seat.interrupted.is_set():
                 raise _Interrupted
+            for push in seat.pushes_now():
+                seat.robot.push(push)
 
         return look
 
@@ -447,8 +455,10 @@ class LiveSession:
         folder = self._recording
         if folder is None:
             raise InvalidInput("nothing is recorded; begin with record()")
-        self._recording = None
-        datasets = [self._asked(seat, seat.robot.recorded) for seat in self._seats]
+        try:  # scenario and controllers stay as they are until the last robot has answered
+            datasets = [self._asked(seat, seat.robot.recorded) for seat in self._seats]
+        finally:
+            self._recording = None
         experiment = dataclasses.replace(
             self.experiment,
             controllers=self.controllers,
@@ -492,18 +502,27 @@ class LiveSession:
             do(*arguments)
 
     def _asked(self, seat: _Seat, do: Callable[[], Outcome]) -> Outcome:
-        """Have something done at a robot's next touchdown, and wait for what comes of it."""
+        """Have something done at a robot's next touchdown, and wait for what comes of it.
+
+        Raises:
+            InvalidInput: The session has ended meanwhile.
+        """
         if not self._running:
-            return do()
-        if self.clock.paused:  # its thread waits, amid a stride that does not count yet
             return do()
         outcome: Future[Outcome] = Future()
 
         def answer() -> None:
+            if not outcome.set_running_or_notify_cancel():
+                return
             try:
                 outcome.set_result(do())
             except Exception as error:
                 outcome.set_exception(error)
 
         seat.asked.put(answer)
-        return outcome.result(timeout=_WAIT)
+        while not wait([outcome], _LOOK).done:
+            if not self._running:
+                raise InvalidInput("the session ended before the next touchdown; ask again")
+            if self.clock.paused and outcome.cancel():
+                return do()  # its thread waits, amid a stride that does not count yet
+        return outcome.result()

@@ -36,6 +36,7 @@ class Control(tornado.websocket.WebSocketHandler):
         self._waiting: deque[bytes] = deque()
         self._sending: asyncio.Task[None] | None = None
         self._second, self._count = 0, 0
+        self._answering: set[asyncio.Task[None]] = set()
 
     def check_origin(self, origin: str) -> bool:
         """Whether a page of that origin may ask; `LabServer.refuses` has looked already."""
@@ -50,8 +51,8 @@ class Control(tornado.websocket.WebSocketHandler):
     def on_close(self) -> None:
         self._server.leave(self)
 
-    async def on_message(self, message: str | bytes) -> None:
-        """Do what the page asks, if it is the one that drives."""
+    def on_message(self, message: str | bytes) -> None:
+        """Do what the page asks, if it is the one that drives; the next may come meanwhile."""
         second = int(time.monotonic())
         self._count = self._count + 1 if second == self._second else 1
         self._second = second
@@ -60,8 +61,14 @@ class Control(tornado.websocket.WebSocketHandler):
         elif self._count > _MOST:
             answer = {"refused": f"More than {_MOST} messages a second; wait a little."}
         else:
-            answer = await self._server.ask(message)
-        if answer:
+            task = asyncio.ensure_future(self._obey(message))
+            self._answering.add(task)  # a task that nothing refers to may be collected
+            task.add_done_callback(self._answering.discard)
+            return
+        self.tell(msgspec.json.encode(answer))
+
+    async def _obey(self, message: str | bytes) -> None:
+        if answer := await self._server.ask(message):
             self.tell(msgspec.json.encode(answer))
 
     def tell(self, data: bytes) -> None:
@@ -87,7 +94,7 @@ class Skill(tornado.web.RequestHandler):
 
     async def get(self) -> None:
         """Its file."""
-        data = await self._aside(lambda: self._server.save_skill(self._robot()))
+        data = await self._aside(lambda: self._server.save_skill(self._robot()), waits=True)
         if data is not None:
             self.set_header("Content-Type", "application/octet-stream")
             self.set_header("Content-Disposition", 'attachment; filename="skill.npz"')
@@ -108,11 +115,10 @@ class Skill(tornado.web.RequestHandler):
         except ValueError:
             raise InvalidInput("robot is no number; load the page again") from None
 
-    async def _aside(self, do: Callable[[], object]) -> object:
+    async def _aside(self, do: Callable[[], object], *, waits: bool = False) -> object:
         """Do something aside from the pages; what is wrong is told."""
-        loop, worker = asyncio.get_running_loop(), self._server._worker
         try:
-            return await loop.run_in_executor(worker, do)
+            return await self._server.aside(do, waits=waits)
         except PronkError as error:
             self.set_status(400)
             self.set_header("Content-Type", "text/plain; charset=utf-8")

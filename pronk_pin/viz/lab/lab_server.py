@@ -16,9 +16,10 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 from tornado.httputil import HTTPServerRequest
@@ -53,6 +54,8 @@ FPS = 50.0
 
 KEPT = 300
 """Strides of each robot that a page which comes late is told."""
+
+Outcome = TypeVar("Outcome")
 
 _PING = 10.0
 """Time after which a page that says nothing is asked whether it is there [s]."""
@@ -100,6 +103,7 @@ class LabServer(LiveServer):
         self._treadmill = Treadmill(len(session.robots))
         self._began = time.monotonic()
         self.frames = 0
+        self._waiter = ThreadPoolExecutor(1, thread_name_prefix="pronk_pin touchdowns")
         super().__init__(lab_scene(session), port=port, host=host)
         self.address = f"{self.url}?token={self._token}"
         self._ending = threading.Event()
@@ -118,6 +122,7 @@ class LabServer(LiveServer):
             self._ending.set()
             self._showing.join()
             self._context.__exit__(None, None, None)
+            self._waiter.shutdown()
         super().close()
 
     # --- what the robots tell ----------------------------------------------------------------
@@ -194,9 +199,15 @@ class LabServer(LiveServer):
         """Do what a page asks, aside from the pages; the answer says what came of it."""
         try:
             asked = read_message(message)
-            return await asyncio.get_running_loop().run_in_executor(self._worker, self._do, asked)
+            waits = isinstance(asked, Record) and not asked.on
+            return await self.aside(lambda: self._do(asked), waits=waits)
         except PronkError as error:
             return {"refused": str(error)}
+
+    async def aside(self, do: Callable[[], Outcome], *, waits: bool = False) -> Outcome:
+        """Do something aside from the pages, in turn; what `waits` for touchdowns holds up none."""
+        worker = self._waiter if waits else self._worker
+        return await asyncio.get_running_loop().run_in_executor(worker, do)
 
     def _do(self, asked: Asked) -> dict[str, Any]:
         said: dict[str, Any] = {}

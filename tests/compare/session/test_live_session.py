@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import resource
 import sys
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -278,3 +280,54 @@ def test_it_goes_in_real_time_and_stops_when_asked() -> None:
     assert first[0] == first[1], "after a reset it begins as it began"
     live.reset()
     assert live.stride()[0][0] == first[0], "in real time it goes as it does at once"
+
+
+def test_who_waits_for_a_touchdown_is_answered_when_it_pauses_and_let_go_when_it_ends() -> None:
+    live = session("pd")
+    with ThreadPoolExecutor(1) as other:
+        with live.running(rate=0.02):  # the first touchdown is half a minute away
+            waits = other.submit(live.skill, 0)
+            time.sleep(0.2)
+            assert not waits.done()
+            live.pause()
+            assert waits.result(timeout=2.0).robot == "a1"
+            live.pause(False)
+            waits = other.submit(live.skill, 0)
+            time.sleep(0.2)
+        with pytest.raises(InvalidInput, match="ended before"):
+            waits.result(timeout=2.0)
+
+
+def test_what_was_before_a_recording_is_not_in_it(tmp_path: Path) -> None:
+    done: list[LiveStride] = []
+    live = LiveSession(
+        Experiment(controllers=("pd",)), on_stride=lambda _robot, stride: done.append(stride)
+    )
+    with live.running(rate=10.0):
+        wait_for(lambda: len(done) > 3)
+        live.pause()
+        live.record(tmp_path / "drive")
+        with pytest.raises(InvalidInput, match="no stride was recorded yet"):
+            live.save()
+        assert live.recording is None
+    assert not (tmp_path / "drive").exists()
+
+
+def test_a_push_from_before_a_reset_does_not_come_after_it() -> None:
+    done: list[LiveStride] = []
+    held, go = threading.Event(), threading.Event()
+
+    def finished(_robot: int, stride: LiveStride) -> None:
+        done.append(stride)
+        if len(done) == 2:  # between strides it takes no push
+            held.set()
+            go.wait(5.0)
+
+    live = LiveSession(Experiment(controllers=("pd",)), on_stride=finished)
+    with live.running(rate=5.0):
+        assert held.wait(10.0)
+        live.push([5.0, 0.0, 0.0])
+        live.reset()
+        go.set()
+        wait_for(lambda: len(done) > 3)
+    assert done[2:4] == done[:2]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import concurrent.futures
 import json
 import os
 import re
@@ -201,6 +202,35 @@ def test_what_is_recorded_on_the_page_is_a_results_folder(lab: LabServer) -> Non
 
     folder = Path(asyncio.run(talk()).rpartition(" ")[2])
     assert Results.load(folder).experiment.controller_names == ("model", "ilc")
+
+
+def test_who_waits_for_a_file_at_the_next_touchdown_holds_up_neither_pushes_nor_the_end(
+    lab: LabServer,
+) -> None:
+    wait_for(lambda: lab._strides[0])
+    lab.session.clock.rate = 0.02  # the next touchdown comes in 15 s
+    token = lab.address.partition("?")[2]
+    with concurrent.futures.ThreadPoolExecutor(1) as other:
+        file = other.submit(status, f"{lab.url}skill?robot=0&{token}")
+
+        async def talk() -> None:
+            first = await page(lab)
+            await first.asks({"do": "record", "on": True})
+            await first.hears("said")
+            await first.asks({"do": "record", "on": False})
+            began = time.monotonic()
+            await first.asks({"do": "push", "impulse": [1, 0, 0]})
+            await first.hears("state")
+            while "push" not in [event.get("do") for event in lab._events]:
+                await asyncio.sleep(0.01)
+            assert time.monotonic() - began < 1.0
+
+        asyncio.run(talk())
+        assert not file.done()
+        began = time.monotonic()
+        lab.close()
+        assert time.monotonic() - began < 3.0
+        assert concurrent.futures.wait([file], 5.0).done, "its connection has ended, too"
 
 
 def test_a_page_that_is_told_too_late_is_left_and_the_robots_go_on(lab: LabServer) -> None:
