@@ -15,6 +15,7 @@ NEEDED = {
     "pronk_pin/robot/specs/a1.toml",
     "pronk_pin/compare/metrics/data/paper_table1.csv",
     "pronk_pin/viz/player/data/page.html",
+    "pronk_pin/viz/lab/data/lab.js",
 }
 
 

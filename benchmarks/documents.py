@@ -45,7 +45,7 @@ def _run(command: str, folder: str) -> str:
         cwd=folder,
         capture_output=True,
         text=True,
-        env={**os.environ, "COLUMNS": "100"},
+        env={**os.environ, "COLUMNS": ""},
     )
     if done.returncode:
         raise RuntimeError(f"{command} ended with {done.returncode}: {done.stderr[-500:]}")

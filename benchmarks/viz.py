@@ -4,7 +4,8 @@ The stream of `display` with two robots and contact forces, as a page receives i
 `MeshcatVisualizer.display` loop with one robot; the size of a file with such a scene of 5 s, and
 how long a browser takes from opening it to the first frame drawn, in software rendering. With a
 results folder, `python benchmarks/viz.py results/<folder>`: the same of its replay, and how many of
-the choices it holds.
+the choices it holds. `python benchmarks/viz.py play`: how near to real time three live robots are
+with a page attached, and how long it takes from a push that is asked for to a frame that shows it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from pinocchio.visualize import MeshcatVisualizer
+from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 from pronk_pin import load_robot
@@ -28,7 +30,7 @@ from pronk_pin.compare import Results
 from pronk_pin.errors import NoBrowser
 from pronk_pin.gait import load_library
 from pronk_pin.robot import Robot
-from pronk_pin.viz import LiveServer, Scene, gait_scene, write_replay
+from pronk_pin.viz import LabServer, LiveServer, Scene, gait_scene, live_lab, write_replay
 from pronk_pin.viz.player import Browser
 from pronk_pin.viz.scenes import result_menu
 
@@ -128,8 +130,83 @@ def result_replay(folder: Path) -> None:
         print(f"opened to first frame, longest of three       {ready:8.2f} s")
 
 
+def pushed_latencies(lab: LabServer, count: int = 10) -> list[float]:
+    """Times from asking for a push to the frame in which the trunk goes the other way [s]."""
+    found = []
+
+    async def page() -> None:
+        token = lab.address.partition("?")[2]
+        origin = {"Origin": lab.url.rstrip("/")}
+        url = lab.url.replace("http", "ws")
+        frames = await websocket_connect(HTTPRequest(f"{url}stream?{token}", headers=origin))
+        asks = await websocket_connect(HTTPRequest(f"{url}lab?{token}", headers=origin))
+
+        async def hear() -> None:
+            while await asks.read_message() is not None:
+                pass
+
+        hearing = asyncio.create_task(hear())
+        for _ in range(count):
+            end = time.monotonic() + 3.0  # the push before is over
+            while time.monotonic() < end:
+                row = np.frombuffer(await frames.read_message(), "<f4")
+            x, then = row[2], lab.session.clock.now
+            began = time.monotonic()
+            await asks.write_message('{"do": "push", "robot": 0, "impulse": [-30, 0, 0]}')
+            while time.monotonic() < began + 2.0:
+                row = np.frombuffer(await frames.read_message(), "<f4")
+                now = lab.session.clock.now
+                if (row[2] - x) < -0.2 * (now - then):  # it was going forward at 0.5 m/s
+                    found.append(time.monotonic() - began)
+                    break
+                x, then = row[2], now
+        hearing.cancel()
+        frames.close()
+        asks.close()
+
+    asyncio.run(page())
+    return found
+
+
+def real_time_factor(lab: LabServer, seconds: float) -> tuple[float, float]:
+    """Simulated time over the wall's, and frames sent a second."""
+    clock, frames, began = lab.session.clock, lab.frames, time.monotonic()
+    slipped = clock.slipped
+    time.sleep(seconds)
+    elapsed = time.monotonic() - began
+    return 1.0 - (clock.slipped - slipped) / elapsed, (lab.frames - frames) / elapsed
+
+
+def live_robots() -> None:
+    """Three live robots: without a page, with one that reads, and in a browser."""
+    with live_lab() as lab:
+        time.sleep(2.0)
+        alone, _ = real_time_factor(lab, 10.0)
+        print(f"real-time factor, three robots, no page       {alone:8.3f}")
+        latencies = pushed_latencies(lab)
+        print(
+            f"push to frame, median of {len(latencies)}                   "
+            f"{1e3 * statistics.median(latencies):8.0f} ms"
+        )
+        print(f"push to frame, longest                        {1e3 * max(latencies):8.0f} ms")
+        try:
+            with Browser(1280, 800) as browser:
+                browser.open(lab.address)
+                browser.wait("lab.counts.frames > 5")
+                with_page, rate = real_time_factor(lab, 20.0)
+                drawn = browser.run("lab.counts.frames")
+        except NoBrowser as error:
+            print(f"in a browser: not measured, {error.reason}")
+            return
+        print(f"real-time factor, page in software rendering  {with_page:8.3f}")
+        print(f"frames sent to it                             {rate:8.0f} /s, {drawn} drawn")
+
+
 def main() -> None:
     """Measure, and print."""
+    if sys.argv[1:] == ["play"]:
+        live_robots()
+        return
     if len(sys.argv) > 1:
         result_replay(Path(sys.argv[1]))
         return

@@ -22,6 +22,7 @@ from pathlib import Path
 from types import FrameType
 
 _steps_done: Synchronized[int] | None = None
+_listener: Callable[[int], object] | None = None
 
 
 def begin_worker(folder: str, counter: Synchronized[int] | None = None) -> None:
@@ -72,10 +73,24 @@ def unguarded_script() -> str:
 
 
 def count_steps(steps: int) -> None:
-    """Tell how many more robot-steps are done, if this process is a worker that counts them."""
+    """Tell how many more robot-steps are done, if this process is a worker that counts them, or
+    somebody listens."""
+    if _listener is not None:
+        _listener(steps)
     if _steps_done is not None:
         with _steps_done.get_lock():
             _steps_done.value += steps
+
+
+@contextmanager
+def listening(listener: Callable[[int], object]) -> Iterator[None]:
+    """Have somebody told of the robot-steps that this process does meanwhile."""
+    global _listener
+    before, _listener = _listener, listener
+    try:
+        yield
+    finally:
+        _listener = before
 
 
 @contextmanager

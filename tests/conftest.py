@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -14,6 +15,8 @@ from pronk_pin import Robot, load_robot
 from pronk_pin._typing import Array
 from pronk_pin.robot import ROBOTS
 from pronk_pin.robot.formats.urdf import mujoco_spec
+
+os.environ.pop("COLUMNS", None)  # what is printed is as wide as it is, whatever the terminal
 
 
 class States(NamedTuple):

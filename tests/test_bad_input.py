@@ -746,6 +746,14 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["ilc", "seeding", "--speed", "0"], "seeding needs three speeds or more"),
     (["ilc", "seeding", "--speed", "0", "0", "0"], "the speeds must increase; give each once, th"),
     (["ilc", "seeding", "--robot", "spot"], "unknown robot 'spot'; choose one of: a1"),
+    (["play", "--speed", "3"], "speed 3 m/s is outside the gait library"),
+    (["play", "--controllers", "ilc-norm-optimal"], "unknown controller of a live session 'ilc-no"),
+    (["play", "--controllers", "pd", "ilc", "model", "model+ilc"], "4 controllers, one robot each"),
+    (["play", "--scenario", "wind"], "unknown scenario 'wind'"),
+    (["play", "--rate", "100"], "rate=100.0; give a number from 0.02 to 20"),
+    (["play", "--duration", "0"], "duration=0.0; give a number"),
+    (["play", "--folder", "."], ". is there already; record to another folder"),
+    (["play", "--port", "-1"], "port=-1; give a whole number from 0 to 65535"),
     (["view", "missing"], "missing: no such results folder or gait library; make the one with 'pr"),
     (["view", "--controller", "pd"], "--controller is for a results folder; name one, or leave th"),
     (["view", "--stride", "3"], "--stride is for a results folder; name one, or leave the option"),
@@ -782,7 +790,7 @@ COMMANDS: list[tuple[list[str], str]] = [
     (["parity", "nowhere.xml"], "nowhere.xml: missing; give the path of a URDF or an MJCF"),
     (["jump"], "Unrecognized options: jump; Available subcommands: compare, gaits, ilc, view,"),
     (["compare", "--speeeds", "3"], "Unrecognized options: --speeeds, 3; Perhaps you meant: --spe"),
-    ([], "Expected one of {compare, gaits, ilc, view, report, reproduce, explain, parity, list}"),
+    ([], "Expected one of {compare, gaits, ilc, view, play, report, reproduce, explain, parity"),
 ]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pronk_pin import load_robot
+from pronk_pin._display import fit
 from pronk_pin.compare import Experiment, Results, Scenario, random_scenarios
 from pronk_pin.control import CONTROLLERS, ControllerSpec, TorqueLibrary
 from pronk_pin.gait import load_library
@@ -69,3 +70,43 @@ def test_what_is_known_of_them_is_shown() -> None:
 @pytest.mark.parametrize("spec", CONTROLLERS.values(), ids=CONTROLLERS)
 def test_a_specification_of_a_controller_fits_on_a_screen(spec: ControllerSpec) -> None:
     assert len(repr(spec)) <= LINES * COLUMNS
+
+
+TABLE = """\
+two joints
+                      calf: peak [rad]   thigh: peak [rad]
+controller                mean    felt       mean    felt  stayed upright
+pd                      0.0988    0.09     0.0905    0.08  14 of 14
+my_laws:controller      0.0708    0.05     0.0408    0.02  13 of 14, 1 diverging
+                    peaks from the true contact on; felt from when the controller felt it"""
+
+
+@pytest.mark.parametrize("width", [41, 50, 60, 76])
+def test_a_table_that_is_too_wide_goes_on_below_with_its_first_column_again(width: int) -> None:
+    text = fit(TABLE, width)
+    assert max(map(len, text.splitlines())) <= width
+    parts = text.split("\n\n")
+    assert len(parts) == (3 if width < 60 else 2)
+    for part in parts:
+        assert [line.split()[0] for line in part.splitlines() if "_laws" in line or "pd" in line]
+    words = [
+        word for word in text.split() if word not in ("controller", "pd", "my_laws:controller")
+    ]
+    names = {"controller", "pd", "my_laws:controller"}
+    assert sorted(words) == sorted(word for word in TABLE.split() if word not in names)
+    for cell in ("calf: peak [rad]", "thigh: peak [rad]", "13 of 14, 1 diverging"):
+        assert cell in text
+
+
+def test_what_fits_or_goes_to_no_screen_stays_as_it_is() -> None:
+    assert fit(TABLE, 95) == TABLE
+    assert fit(TABLE, None) == TABLE
+
+
+def test_paragraphs_are_filled_again_and_lists_hang() -> None:
+    wide = "word " * 19 + "word\n" + "more " * 4
+    filled = ["word " * 15 + "word", "word " * 4 + "more " * 3 + "more"]
+    assert fit(wide, 80).splitlines() == filled
+    listed = "name  " + "says " * 20 + "\nother  short"
+    first, second, last = fit(listed, 80).splitlines()
+    assert (first[:10], second[:12], last) == ("name  says", "      says s", "other  short")

@@ -33,6 +33,7 @@ from .ilc import Ilc
 from .listing import List
 from .options import REGISTRY
 from .parity import Parity
+from .play import Play
 from .view import View
 
 
@@ -54,6 +55,7 @@ COMMANDS: Mapping[str, type[_Runs]] = {
     "gaits": Gaits,
     "ilc": Ilc,
     "view": View,
+    "play": Play,
     "report": Report,
     "reproduce": Reproduce,
     "explain": Explain,

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 from tyro.conf import Positional, arg
 
+from .._display import show
+from .progress import progress
+
 if TYPE_CHECKING:
     from ..compare import Experiment, Results
 
@@ -155,7 +158,7 @@ class Compare:
         name = "comparison" if self.suite in (None, "default") else self.suite
         folder, world = self.folder or default_folder(name), self.experiment.mjcf
         if world:
-            print(mjcf_parity(self.experiment.model, world).table())
+            show(mjcf_parity(self.experiment.model, world).table())
         results = run_experiment(
             self.experiment,
             folder,
@@ -164,12 +167,12 @@ class Compare:
             resimulate=self.resimulate,
         )
         print(f"robot {results.experiment.robot_name}, base {results.experiment.base}\n")
-        print(format_summary(results.summary()))
+        show(format_summary(results.summary()))
         if engines := format_between_engines(results):
-            print(f"\n{engines}")
+            show(f"\n{engines}")
         times = ", ".join(f"{name} {time:.3g}" for name, time in results.control_times.items())
         if times:
-            print(f"\ntime that controllers took on this machine, a robot and tick [us]: {times}")
+            show(f"\ntime that controllers took on this machine, a robot and tick [us]: {times}")
         _print_pages(results, lambda: _made(lambda: _report(results)))
 
 
@@ -182,6 +185,8 @@ class Reproduce:
 
     folder: Path | None = None
     """Results folder; by default results/<time>-paper. One that is there is completed."""
+    speeds: tuple[float, ...] = ()
+    """Desired speeds [m/s]; by default all of the paper's."""
     seeds: tuple[int, ...] = (0,)
     """Seeds of the scatter at the start, of which little is left after a second."""
     workers: int | None = None
@@ -193,11 +198,12 @@ class Reproduce:
         from ..compare.experiment import load_suite
         from ..compare.studies import format_reproduction
 
-        experiment = dataclasses.replace(load_suite("paper"), seeds=self.seeds)
+        asked: dict[str, Any] = {"speeds": self.speeds} if self.speeds else {}
+        experiment = load_suite("paper", seeds=self.seeds, **asked)
         folder = self.folder or default_folder("paper")
         results = run_experiment(experiment, folder, workers=self.workers)
         learners = tuple(name for name in experiment.controller_names if name != "pd")
-        print(format_reproduction(results, learners=learners))
+        show(format_reproduction(results, learners=learners))
         print(f"\nresults  {results.folder}")
 
 
@@ -223,11 +229,11 @@ class Report:
 
         results = Results.load(self.result)
         if self.other is not None:
-            print(format_changes(results, Results.load(self.other)))
+            show(format_changes(results, Results.load(self.other)))
             return
-        print(format_summary(results.summary()))
+        show(format_summary(results.summary()))
         if engines := format_between_engines(results):
-            print(f"\n{engines}")
+            show(f"\n{engines}")
         _print_pages(results, lambda: str(_report(results)))
         if self.figures is not None:
             for path in write_figures(results, self.figures):
@@ -287,11 +293,12 @@ class Explain:
         strides = results.all_strides(controller=self.controller, scenario=self.scenario)
         rng = np.random.default_rng(self.seed)
         gaits = results.experiment.planned_at(strides["speed"].to_numpy().tolist())
-        explanation = explain(
-            strides, gaits=gaits, imu_noise=self.imu_noise, draws=self.draws, rng=rng
-        )
+        with progress("explaining", counted=False):
+            explanation = explain(
+                strides, gaits=gaits, imu_noise=self.imu_noise, draws=self.draws, rng=rng
+            )
         text = describe(explanation)
-        print(f"{cell.controller} in scenario {cell.scenario}\n\n{text}")
+        show(f"{cell.controller} in scenario {cell.scenario}\n\n{text}")
         if self.figure is not None:
             print(
                 f"\nfigure  {write_explanation_figure(explanation, self.figure, speed=self.speed)}"
@@ -304,7 +311,7 @@ class Explain:
         if self.close_loop:
             planned_at = results.experiment.planned_at
             table = close_loop(explanation, strides, planned_at=planned_at, rng=rng)
-            print(f"\n{format_loop(table)}")
+            show(f"\n{format_loop(table)}")
 
     def _check(self) -> None:
         """What can be told to be wrong before anything is read."""

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, subcommand
 
+from .._display import show
+
 if TYPE_CHECKING:
     from ..gait import GaitLibrary
     from ..robot import Robot
@@ -63,7 +65,7 @@ class Build:
             folder=folder,
             workers=self.workers,
         )
-        print(describe_library(library))
+        show(describe_library(library))
         print(f"\ngaits   {self.output}\nfolder  {folder}  (each gait; no longer needed)")
 
 
@@ -101,10 +103,10 @@ class Show(_OfLibrary):
         library = self.load()
         if self.speed is None:
             shown_gaits = library if self.apex is None else library.at_apex(self.apex)
-            print(describe_library(shown_gaits))
+            show(describe_library(shown_gaits))
         else:
             robot = robot_of(library, self.robot)
-            print(describe_gait(library, self.speed, self.apex, robot=robot))
+            show(describe_gait(library, self.speed, self.apex, robot=robot))
 
 
 @dataclass(frozen=True)

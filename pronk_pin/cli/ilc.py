@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, subcommand
 
+from .._display import show
+from .progress import progress
+
 if TYPE_CHECKING:
     from ..gait import Gait
 
@@ -70,9 +73,15 @@ class Analyze:
         gaits: list[Gait]
         if self.result is None:
             spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
-            strides = simulate_learning(
-                spec, self.speed, scenario, robot=self.robot, gaits=self.gaits, strides=self.strides
-            )
+            with progress("learning"):
+                strides = simulate_learning(
+                    spec,
+                    self.speed,
+                    scenario,
+                    robot=self.robot,
+                    gaits=self.gaits,
+                    strides=self.strides,
+                )
             _, library = machine_and_gaits(self.robot, self.gaits)
             gaits = [library.at(speed) for speed in self.speed]
         else:
@@ -84,11 +93,12 @@ class Analyze:
             gaits = experiment.planned_at(self.speed)
         predictions = []
         for k, speed in enumerate(self.speed):
-            compared = compare_prediction(
-                spec, strides, speed, scenario, number=self.strides, gait=gaits[k]
-            )
+            with progress("predicting", counted=False):
+                compared = compare_prediction(
+                    spec, strides, speed, scenario, number=self.strides, gait=gaits[k]
+                )
             predictions.append(compared)
-            print(describe_prediction(predictions[-1]), end="\n\n")
+            show(describe_prediction(predictions[-1]) + "\n")
         if self.figure is not None:
             print(f"figure  {save_figure(predicted_and_measured(predictions), self.figure)}")
 
@@ -122,15 +132,16 @@ class Stability:
 
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         speeds = self.speed or _covered(self.robot, self.gaits, (0.6, 0.8))
-        table = measure_stability(
-            spec,
-            speeds,
-            scenario,
-            couplings=self.couplings,
-            robot=self.robot,
-            gaits=self.gaits,
-        )
-        print(describe_stability(table))
+        with progress("learning"):
+            table = measure_stability(
+                spec,
+                speeds,
+                scenario,
+                couplings=self.couplings,
+                robot=self.robot,
+                gaits=self.gaits,
+            )
+        show(describe_stability(table))
 
 
 @dataclass(frozen=True)
@@ -171,16 +182,17 @@ class Drive:
 
         known_figure(self.figure)
         real("push", self.push, Interval(-200, 200, "N s"))
-        driving = measure_driving(
-            self.command or (PUSHED if self.push else RAMPS),
-            load_scenario(self.scenario),
-            controllers=self.controllers,
-            robot=self.robot,
-            gaits=self.gaits,
-            references=self.reference,
-            push=self.push,
-        )
-        print(format_commands(driving.summary))
+        with progress("learning and driving"):
+            driving = measure_driving(
+                self.command or (PUSHED if self.push else RAMPS),
+                load_scenario(self.scenario),
+                controllers=self.controllers,
+                robot=self.robot,
+                gaits=self.gaits,
+                references=self.reference,
+                push=self.push,
+            )
+        show(format_commands(driving.summary))
         if self.figure is not None:
             print(f"\nfigure  {save_figure(driving_figure(driving.strides), self.figure)}")
 
@@ -205,8 +217,9 @@ class Wander:
         from ..compare.studies import SWEEPS, describe_wandering, measure_wandering
 
         command, scenario = self.command or SWEEPS, load_scenario(self.scenario)
-        table = measure_wandering(command, scenario, robot=self.robot, gaits=self.gaits)
-        print(describe_wandering(table))
+        with progress("learning"):
+            table = measure_wandering(command, scenario, robot=self.robot, gaits=self.gaits)
+        show(describe_wandering(table))
 
 
 @dataclass(frozen=True)
@@ -240,8 +253,9 @@ class Gains:
         known_figure(self.figure)
         spec, scenario = load_controller(self.controller), load_scenario(self.scenario)
         speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
-        table = sweep_gains(spec, speeds, scenario, robot=self.robot, gaits=self.gaits)
-        print(describe_gains(table))
+        with progress("learning"):
+            table = sweep_gains(spec, speeds, scenario, robot=self.robot, gaits=self.gaits)
+        show(describe_gains(table))
         if self.figure is not None:
             print(f"\nfigure  {save_figure(gains_figure(table), self.figure)}")
 
@@ -279,15 +293,16 @@ class Transfer:
         from ..viz.figures import transfers_figure
 
         known_figure(self.figure)
-        table = measure_transfers(
-            load_controller(self.controller),
-            self.speed or _covered(self.robot, self.gaits, _FINE),
-            load_scenario(self.scenario),
-            [load_scenario(name) for name in self.scenarios],
-            robot=self.robot,
-            gaits=self.gaits,
-        )
-        print(describe_transfers(table))
+        with progress("learning"):
+            table = measure_transfers(
+                load_controller(self.controller),
+                self.speed or _covered(self.robot, self.gaits, _FINE),
+                load_scenario(self.scenario),
+                [load_scenario(name) for name in self.scenarios],
+                robot=self.robot,
+                gaits=self.gaits,
+            )
+        show(describe_transfers(table))
         if self.figure is not None:
             print(f"\nfigure  {save_figure(transfers_figure(table), self.figure)}")
 
@@ -299,6 +314,8 @@ class Seeding:
     The torque library learns at all speeds; each inner one begins with its neighbours' torques.
     """
 
+    controller: str = "ilc"
+    """Controller whose laws learn."""
     speed: tuple[float, ...] = ()
     """Speeds [m/s], increasing; by default -0.4 to 0.8 in steps of 0.2, as far as the robot's
     gaits go."""
@@ -315,15 +332,21 @@ class Seeding:
         """Do it."""
         from ..compare import load_scenario
         from ..compare.studies import describe_seeding, measure_seeding
+        from ..control import load_controller
         from ..viz import known_figure, save_figure
         from ..viz.figures import errors_by_seed
 
         known_figure(self.figure)
         speeds = self.speed or _covered(self.robot, self.gaits, _FINE)
-        table = measure_seeding(
-            speeds, load_scenario(self.scenario), robot=self.robot, gaits=self.gaits
-        )
-        print(describe_seeding(table))
+        with progress("learning"):
+            table = measure_seeding(
+                speeds,
+                load_scenario(self.scenario),
+                spec=load_controller(self.controller),
+                robot=self.robot,
+                gaits=self.gaits,
+            )
+        show(describe_seeding(table))
         if self.figure is not None:
             print(f"figure  {save_figure(errors_by_seed(table), self.figure)}")
 
@@ -387,7 +410,7 @@ class BuildLibrary:
             workers=self.workers,
         )
         library.save(self.file)
-        print(f"{describe_library(library)}\n\nlibrary  {self.file}")
+        show(f"{describe_library(library)}\n\nlibrary  {self.file}")
 
 
 @dataclass(frozen=True)
@@ -429,7 +452,7 @@ class TryLibrary:
             gaits=self.gaits,
             progress=True,
         )
-        print(describe_library_trial(table))
+        show(describe_library_trial(table))
 
 
 @dataclass(frozen=True)
@@ -463,8 +486,11 @@ class Engines:
         speeds = self.speed or _covered(self.robot, self.gaits, (-0.4, 0.0, 0.4, 0.8))
         robot, library = machine_and_gaits(self.robot, self.gaits)
         gaits = [library.at(speed) for speed in speeds]
-        table = measure_engine_transfer(robot, gaits, load_scenario(self.scenario), self.engines)
-        print(describe_engine_transfer(table))
+        with progress("learning"):
+            table = measure_engine_transfer(
+                robot, gaits, load_scenario(self.scenario), self.engines
+            )
+        show(describe_engine_transfer(table))
 
 
 @dataclass(frozen=True)

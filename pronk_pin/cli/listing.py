@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from tyro.conf import Positional
 
+from .._display import show
+
 if TYPE_CHECKING:
     from ..control import ControllerSpec
 
@@ -27,8 +29,7 @@ class List:
         """Do it."""
         rows = list(_LISTS[self.kind]())
         width = max(len(name) for name, _ in rows)
-        for name, text in rows:
-            print(f"{name:<{width}}  {text}".rstrip())
+        show("\n".join(f"{name:<{width}}  {text}".rstrip() for name, text in rows))
 
 
 def _controllers() -> Iterator[tuple[str, str]]:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from .._display import show
+
 
 @dataclass(frozen=True)
 class Parity:
@@ -49,5 +51,5 @@ class Parity:
             rng=np.random.default_rng(self.seed),
             tolerance=self.tolerance,
         )
-        print(parity.table(full=self.full))
+        show(parity.table(full=self.full))
         return 0 if parity.agrees else 1

@@ -9,6 +9,7 @@ from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment, run_cell
 from .identification import Explanation, describe, explain
 from .metrics import Metric, reduction, steady, summarize
 from .results import Results, default_folder
+from .session import LiveSession, LiveStride, Moment
 from .simulation import Schedule, Simulation
 from .world import (
     ENGINES,
@@ -46,8 +47,11 @@ __all__ = [
     "Experiment",
     "Explanation",
     "ForeignRobot",
+    "LiveSession",
+    "LiveStride",
     "Metric",
     "Mismatch",
+    "Moment",
     "Motion",
     "MujocoEngine",
     "MujocoWorld",

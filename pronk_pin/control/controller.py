@@ -535,6 +535,15 @@ class Controller:
             following = last + self.guard.step[rows] * (following - last)
         return following
 
+    def unlearn_last(self) -> None:
+        """Learn nothing from the last strides: they were played with other torques than now."""
+        self.skipped[:] = SKIPPED.index("duration unknown")
+
+    def take_over(self, before: Controller) -> None:
+        """Go on with what another controller of the same robots has estimated of their speeds."""
+        if before.spec.speed_filter == self.spec.speed_filter:
+            self._estimator = before._estimator
+
     @property
     def memory(self) -> Memory:
         """What is played in the next stride: feedforward, and how long the flight is to last."""

@@ -142,11 +142,58 @@ class SpeedCommand:
         self._slowest = float(max(speeds[0], library.speeds[0]))
         self._fastest = float(min(speeds[-1], library.speeds[-1]))
         for profile in self.profiles:
-            for speed in (profile.slowest, profile.fastest):
-                if not self._slowest <= speed <= self._fastest:
-                    raise SpeedOutOfRange(speed, self._slowest, self._fastest)
+            self._check_covers(profile)
         self.speed = np.array([float(profile.speeds[0]) for profile in self.profiles])
         self.memory = self._memory(speeds, torque)
+
+    def _check_covers(self, profile: SpeedProfile) -> None:
+        for speed in (profile.slowest, profile.fastest):
+            if not self._slowest <= speed <= self._fastest:
+                raise SpeedOutOfRange(speed, self._slowest, self._fastest)
+
+    def follow(self, profiles: Sequence[SpeedProfile]) -> None:
+        """Command other profiles from now on, one for each robot, on the same clock.
+
+        Raises:
+            SpeedOutOfRange: One is beyond the library, or the torques.
+        """
+        for profile in profiles:
+            self._check_covers(profile)
+        self.profiles = tuple(profiles)
+
+    def learned(self, row: int) -> TorqueLibrary:
+        """What a robot's memory holds, by speed; its spread is not known, and stands as none."""
+        torque, planned = self.memory.feedforward[row].copy(), self._planned(self.memory.speeds)
+        stretch = self.memory.stretch[row]
+        return TorqueLibrary(self.memory.speeds, torque, np.zeros_like(torque), stretch * planned)
+
+    def remember(self, torque: TorqueLibrary | None) -> None:
+        """Have the robots play other torques from their next touchdown on; None for none.
+
+        Beyond the speeds of the torques they are held as they are at the nearest of them; where
+        they are of conditions, too, those of `TorqueLibrary.home` are played.
+
+        Raises:
+            InvalidInput: The torques are of another number of joints, or samples.
+        """
+        memory = self.memory
+        if torque is None:
+            memory.feedforward[:], memory.stretch[:] = 0.0, 1.0
+            return
+        if torque.torque.shape[-3:] != memory.feedforward.shape[2:]:
+            raise InvalidInput(
+                f"torques of shape {torque.torque.shape[-3:]} at each speed, and these robots take "
+                f"{memory.feedforward.shape[2:]}; give a library that was learned by this robot"
+            )
+        torque = torque.in_conditions()
+        near = np.clip(memory.speeds, torque.speeds[0], torque.speeds[-1])
+        near = np.clip(near, self._library.speeds[0], self._library.speeds[-1])
+        flight = np.interp(near, torque.speeds, torque.flight)
+        memory.feedforward[:], memory.stretch[:] = torque.at(near), flight / self._planned(near)
+
+    def _planned(self, speeds: Array) -> Array:
+        """How long flights are planned to last at speeds [s]."""
+        return np.array([gait.flight.duration for gait in self.gaits_at(speeds)])
 
     def _memory(self, speeds: Array, torque: TorqueLibrary | None) -> SpeedMemory:
         n, gaits = len(self.profiles), self.gaits_at(speeds)

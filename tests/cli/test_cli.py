@@ -122,6 +122,31 @@ def test_report_prints_the_table_again(result: Path, capsys: pytest.CaptureFixtu
     assert (result / "report.html").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        *("report RESULT", "report RESULT RESULT", "explain RESULT --draws 2", "parity ROBOT"),
+        *("gaits show", "gaits show 0.3", "list controllers", "list scenarios", "list metrics"),
+    ],
+)
+def test_a_narrow_terminal_is_not_overrun(
+    words: str,
+    result: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("pronk_pin.cli.comparison._print_pages", lambda *_: None)
+    robot = tmp_path / "robot.xml"
+    robot.write_text(mujoco_spec(load_robot()).to_xml())
+    places = {"RESULT": str(result), "ROBOT": str(robot)}
+    assert main([places.get(word, word) for word in words.split()]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 1
+    assert not [line for line in lines if len(line) > 80 and str(tmp_path.parent) not in line]
+
+
 def test_compare_again_takes_what_is_there(
     result: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -70,9 +70,12 @@ print(*sys.modules)
     heavy = {"numpy", "scipy", "pandas", "xarray", "netCDF4", "matplotlib", "tqdm", "msgspec"}
     assert not modules & (heavy | {"pinocchio", "mujoco", "casadi", "tornado", "PIL", "yaml"})
     rooms = {name for name in modules if name.startswith("pronk_pin.")}
-    assert rooms <= {"pronk_pin._workers", "pronk_pin.errors", "pronk_pin.cli"} | {
-        name for name in rooms if name.startswith("pronk_pin.cli.")
-    }
+    assert rooms <= {
+        "pronk_pin._workers",
+        "pronk_pin._display",
+        "pronk_pin.errors",
+        "pronk_pin.cli",
+    } | {name for name in rooms if name.startswith("pronk_pin.cli.")}
 
 
 @pytest.mark.parametrize("command", COMMANDS, ids=" ".join)

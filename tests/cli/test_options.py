@@ -34,6 +34,7 @@ from pronk_pin.cli.ilc import (
     Wander,
 )
 from pronk_pin.cli.parity import Parity
+from pronk_pin.cli.play import Play
 from pronk_pin.cli.view import FilmOptions, View
 from pronk_pin.compare import Experiment, MujocoEngine, Results, Schedule, run_experiment
 from pronk_pin.compare.experiment import load_suite
@@ -192,7 +193,13 @@ STUDIES: Mapping[str, tuple[type, str, Mapping[str, Case]]] = {
     "seeding": (
         Seeding,
         "measure_seeding",
-        {"speed": SPEEDS, "scenario": SCENARIO, "robot": ROBOT, "gaits": GAITS},
+        {
+            "controller": named("spec", "ilc-fast", "--controller ilc-fast"),
+            "speed": SPEEDS,
+            "scenario": SCENARIO,
+            "robot": ROBOT,
+            "gaits": GAITS,
+        },
     ),
     "engines": (
         Engines,
@@ -488,6 +495,7 @@ def test_a_folder_that_is_there_goes_on_with_its_own_experiment(
 @pytest.mark.parametrize(
     "case",
     [
+        experiment("speeds", (0.1, 0.3), "--speeds 0.1 0.3"),
         experiment("seeds", (3, 4), "--seeds 3 4"),
         argument("workers", 2, "--workers 2"),
         Case("--folder mine", lambda given: Path(given["folder"]), Path("mine")),
@@ -502,7 +510,7 @@ def test_an_option_of_reproduce_reaches_the_run(
     assert case.found(given) == case.value
     assert case.found(arguments(["reproduce"], target)) != case.value
     assert asked(given).controller_names[0] == "pd"
-    assert options_of(Reproduce) == {"folder", "seeds", "workers"}
+    assert options_of(Reproduce) == {"folder", "speeds", "seeds", "workers"}
 
 
 def test_what_is_reproduced_are_the_learners_of_the_suite(
@@ -823,6 +831,56 @@ def test_an_option_of_films_reaches_picture_and_film(
         assert given["path"] == Path(path.split()[1])
         without = arguments(["view", *path.split()], f"pronk_pin.viz.{target}")
         assert getattr(without["film"], option) != value
+
+
+def of_experiment(name: str, value: object, words: str) -> Case:
+    """An option that is an attribute of the experiment."""
+    return Case(words, lambda given: getattr(given["experiment"], name), value)
+
+
+PLAY = {
+    "controllers": of_experiment("controllers", ("pd", "ilc"), "--controllers pd ilc"),
+    "scenario": of_experiment("scenarios", ("payload=2",), "--scenario payload=2"),
+    "robot": of_experiment("robot", "go2", "--robot go2"),
+    "gaits": Case("--gaits GAITS", lambda given: len(given["experiment"].library.speeds), 12),
+    "seed": of_experiment("seeds", (3,), "--seed 3"),
+    "speed": argument("speed", 0.2, "--speed 0.2"),
+    "rate": argument("rate", 0.5, "--rate 0.5"),
+    "folder": argument("folder", Path("drive"), "--folder drive"),
+    "port": argument("port", 7123, "--port 7123"),
+    "host": argument("host", "localhost", "--host localhost"),
+}
+SERVED_LAB = {
+    "open": argument("open_browser", False, "--no-open"),
+    "duration": argument("duration", 7.0, "--duration 7"),
+}
+
+
+@pytest.mark.parametrize("option", PLAY)
+def test_an_option_of_play_reaches_the_session(
+    option: str, arguments: Callable[..., Arguments], tmp_path: Path
+) -> None:
+    case = PLAY[option]
+    some_gaits(tmp_path / "gaits.npz", 0, 12)
+    words = case.words.replace("GAITS", str(tmp_path / "gaits.npz")).split()
+    given = arguments(["play", *words], "pronk_pin.viz.live_lab")
+    assert case.found(given) == case.value
+    assert case.found(arguments(["play"], "pronk_pin.viz.live_lab")) != case.value
+
+
+@pytest.mark.parametrize("option", SERVED_LAB)
+def test_an_option_of_play_reaches_its_page(
+    option: str, arguments: Callable[..., Arguments], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pronk_pin.viz.live_lab", lambda *_, **__: None)
+    case = SERVED_LAB[option]
+    given = arguments(["play", *case.words.split()], "pronk_pin.viz.serve_lab")
+    assert case.found(given) == case.value
+    assert case.found(arguments(["play"], "pronk_pin.viz.serve_lab")) != case.value
+
+
+def test_every_option_of_play_has_its_case() -> None:
+    assert {*PLAY, *SERVED_LAB} == options_of(Play)
 
 
 def test_every_option_of_view_has_its_case() -> None:

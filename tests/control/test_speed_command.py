@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from pronk_pin.compare import Schedule, Simulation, load_scenario
-from pronk_pin.control import SpeedCommand, SpeedMemory, SpeedProfile, load_controller
+from pronk_pin.control import (
+    SpeedCommand,
+    SpeedMemory,
+    SpeedProfile,
+    TorqueLibrary,
+    load_controller,
+)
 from pronk_pin.errors import InvalidInput, SpeedOutOfRange
 from pronk_pin.gait import GaitLibrary, load_library
 from pronk_pin.robot import Robot
@@ -44,6 +50,46 @@ def test_what_a_stride_teaches_is_there_at_its_speed_and_fades_to_the_next_knots
     np.testing.assert_allclose(taught.at(ROWS, speed, 1)[:, 0, 0], 0.3)  # the other part
     nearer = taught.feedforward[1, 1, 0, 0, 0] - 0.2, taught.feedforward[1, 2, 0, 0, 0] - 0.6
     np.testing.assert_allclose(nearer, np.array([0.75, 0.25]) * 3.0 / (0.75**2 + 0.25**2))
+
+
+def skill(library: GaitLibrary, speeds: list[float]) -> TorqueLibrary:
+    """Torques that are their speed, over the joints, and flights that last a tenth longer."""
+    torque = (
+        np.array(speeds)[:, None, None, None] * np.linspace(1.0, 2.0, 12) * np.ones((2, 161, 1))
+    )
+    planned = np.array([library.at(speed).flight.duration for speed in speeds])
+    return TorqueLibrary(np.array(speeds), torque, np.zeros_like(torque), 1.1 * planned)
+
+
+def test_other_torques_are_remembered_by_speed_and_held_beyond_theirs(library: GaitLibrary) -> None:
+    command = SpeedCommand([SpeedProfile.parse("0.2 1s")] * 2, library)
+    command.remember(skill(library, [0.0, 0.2, 0.4]))
+    played = command.memory.at(ROWS, np.array([0.3, 0.8]), 1)
+    np.testing.assert_allclose(played[:, 0, 0], [0.3, 0.4])
+    np.testing.assert_allclose(played[:, 0, 11], [0.6, 0.8])
+    stretched = command.memory.stretch_at(ROWS, np.array([0.2, 0.8]))
+    np.testing.assert_allclose(stretched, 1.1, rtol=1e-3)
+    learned = command.learned(1)
+    np.testing.assert_allclose(learned.at(np.array([0.1]))[0, 0, 0, 0], 0.1)
+    again = SpeedCommand([SpeedProfile.parse("0.2 1s")], library)
+    again.remember(learned)
+    np.testing.assert_allclose(again.memory.feedforward, command.memory.feedforward[1:])
+    np.testing.assert_allclose(again.memory.stretch, command.memory.stretch[1:])
+    command.remember(None)
+    assert not command.memory.feedforward.any()
+    np.testing.assert_array_equal(command.memory.stretch, 1.0)
+    few = np.zeros((1, 2, 161, 6))
+    with pytest.raises(InvalidInput, match="learned by this robot"):
+        command.remember(TorqueLibrary(np.zeros(1), few, few, np.ones(1)))
+
+
+def test_other_profiles_are_followed_if_there_are_gaits_for_them(library: GaitLibrary) -> None:
+    command = SpeedCommand([SpeedProfile.parse("0.2 1s")] * 2, library)
+    command.follow([SpeedProfile.parse("0.1 1s"), SpeedProfile.parse("0.4 1s")])
+    np.testing.assert_allclose(command.commanded(ROWS, np.zeros(2)), [0.4, 0.1])
+    with pytest.raises(SpeedOutOfRange):
+        command.follow([SpeedProfile.parse("0.1 1s"), SpeedProfile.parse("3 1s")])
+    np.testing.assert_allclose(command.commanded(ROWS, np.zeros(2)), [0.4, 0.1])
 
 
 def simulation(robot: Robot, library: GaitLibrary, words: str | None, name: str) -> Simulation:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from ...errors import InvalidInput
 from ...gait import Gait
-from ..experiment import Cell, Experiment
+from ..experiment import Cell, Experiment, check_stored_library
 from ..simulation import SHORTER, check_memory, number_of_robots
 from ..world import check_engine
 
@@ -30,6 +30,16 @@ def check_engines(cells: Iterable[Cell]) -> None:
     for cell in asked.values():
         world = cell.world
         check_engine(cell.experiment.model, world, cell.experiment.base)
+
+
+def check_libraries(cells: Iterable[Cell]) -> None:
+    """Check that torque libraries in files, which controllers begin with, are there and fit.
+
+    Raises:
+        FileProblem, InvalidInput: One does not; see `check_stored_library`.
+    """
+    for cell in {cell.controller: cell for cell in cells}.values():
+        check_stored_library(cell)
 
 
 def check_demand(experiment: Experiment, workers: int) -> None:

@@ -38,7 +38,7 @@ from ..results import (
     remove_if_empty,
 )
 from ..simulation import Progress
-from .demand import check_demand, check_engines
+from .demand import check_demand, check_engines, check_libraries
 from .executors import WorkerPool, connect, known_address, processes
 
 MAX_RETRIES = 3
@@ -126,6 +126,7 @@ def _complete(
     check_completion(results)
     robots = len(results.experiment.commands or results.experiment.speeds)
     check_engines(cells)
+    check_libraries(cells)
     with tqdm(
         total=sum(map(_robot_steps, cells)),
         desc=f"simulating {robots} robots x {len(cells)}",

@@ -4,11 +4,11 @@ Comes in: robot, speeds, controllers, scenarios and seeds, or the name of a suit
 Goes out: an `Experiment`, its cells and their definition, and the strides of a cell.
 """
 
-from .cell import run_cell
+from .cell import Cell, check_stored_library, run_cell, strides_attributes
 from .definition import Definition, cell_definition, define, differences, fingerprint
 from .description import describe
 from .entries import name_of
-from .experiment import DEFAULT_CONTROLLERS, Cell, Experiment
+from .experiment import DEFAULT_CONTROLLERS, Experiment
 from .experiment_file import GAITS, URDF, from_document, read_config, to_document
 from .initial_feedforward import (
     LIBRARY_VARIABLES,
@@ -30,6 +30,7 @@ __all__ = [
     "Experiment",
     "cell_definition",
     "check_library",
+    "check_stored_library",
     "define",
     "describe",
     "differences",
@@ -41,6 +42,7 @@ __all__ = [
     "name_of",
     "read_config",
     "run_cell",
+    "strides_attributes",
     "to_document",
     "torque_library",
 ]

@@ -18,7 +18,8 @@ from ..world import mjcf_sha256 as mjcf_digest
 from .description import Description, describe
 
 if TYPE_CHECKING:
-    from .experiment import Cell, Experiment
+    from .cell import Cell
+    from .experiment import Experiment
 
 Definition: TypeAlias = Description
 """Everything that the numbers of an experiment, or of a cell, depend on."""

@@ -45,22 +45,14 @@ from ...robot import (
 from ..metrics import Metric, load_metric
 from ..simulation import SHORTEST, Schedule
 from ..world import DEFAULT_ENGINE, Scenario, load_scenario, shipped_scenario
+from .cell import Cell, depends_on_learning
 from .description import describe
 from .entries import digest_of, name_of, named, shortest
-
-LEARNED = ("library", "identified")
-"""Sources of feedforward that need the strides of a cell in which `ilc` has learned, unless they
-are in a file."""
 
 DEFAULT_CONTROLLERS = (
     *("pd", "ilc-paper", "ilc-stance", "ilc", "ilc+rotors"),
     *("model", "model+rotors", "library"),
 )
-
-
-def depends_on_learning(spec: ControllerSpec) -> bool:
-    """Whether a controller begins with what `ilc` learns in the same scenario."""
-    return spec.source in LEARNED and not spec.library
 
 
 def default_controllers(robot: Robot) -> tuple[str, ...]:
@@ -161,7 +153,11 @@ class Experiment(Displayed):
         }
         for name, values in lists.items():
             if len(values) == 0 or len(set(values)) != len(values):
-                raise InvalidInput(f"{name} must name at least one, and none of them twice")
+                files = any(spec.library for spec in specs) and name == "controllers"
+                told = (
+                    "; of a torque library's file its name counts, not its folder" if files else ""
+                )
+                raise InvalidInput(f"{name} must name at least one, and none of them twice{told}")
         self._check_controllers()
         for world in worlds:
             world.check_joints(self.model)
@@ -450,93 +446,3 @@ def _fixed(one: Experiment, other: Experiment) -> Iterator[tuple[str, object, ob
     for part in dataclasses.fields(Schedule):
         name = part.name
         yield f"schedule.{name}", getattr(one.schedule, name), getattr(other.schedule, name)
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One simulation of an experiment: all commands, or all speeds of a batch, one controller,
-    scenario and seed.
-
-    Attributes:
-        controller: Name of the controller.
-        scenario: Name of the scenario.
-        seed: Seed of all that is random.
-        batch: Index of the speeds among the experiment's batches.
-        experiment: The experiment, with the objects of these names.
-        practice: Whether it is the learning at constant speeds before speeds are commanded.
-    """
-
-    controller: str
-    scenario: str
-    seed: int
-    batch: int
-    experiment: Experiment = field(compare=False, repr=False)
-    practice: bool = False
-
-    @property
-    def name(self) -> str:
-        """Name of the cell's file."""
-        later = f".{self.batch + 1}" if self.batch else ".practice" if self.practice else ""
-        return f"{self.controller}_{self.scenario}_{self.seed}{later}"
-
-    @property
-    def commands(self) -> tuple[str, ...]:
-        """Its commanded speeds; none where its speeds are constant."""
-        return () if self.practice else self.experiment.commands
-
-    @property
-    def robots(self) -> int:
-        """How many robots it simulates."""
-        return len(self.commands or self.speeds)
-
-    @property
-    def schedule(self) -> Schedule:
-        """What happens when; where speeds are commanded, as long as the longest command lasts."""
-        schedule = self.experiment.schedule
-        if not self.commands:
-            return schedule
-        longest = max(profile.duration for profile in self.experiment.profiles)
-        return dataclasses.replace(schedule, baseline=0.0, learning=longest)
-
-    @property
-    def speeds(self) -> tuple[float, ...]:
-        """Its speeds [m/s]."""
-        return (self.experiment.batches or (self.experiment.speeds,))[self.batch]
-
-    @property
-    def spec(self) -> ControllerSpec:
-        """Its controller."""
-        return self.experiment.controller(self.controller)
-
-    @property
-    def world(self) -> Scenario:
-        """Its scenario, in the experiment's MJCF if it has one, on ground of its own seed."""
-        world = load_scenario(self.experiment.scenario(self.scenario), mjcf=self.experiment.mjcf)
-        return dataclasses.replace(world, seed=world.seed + self.seed)
-
-    @property
-    def alone(self) -> Experiment:
-        """The experiment of this cell alone, and of the one that it depends on."""
-        experiment = self.experiment
-        return dataclasses.replace(
-            experiment,
-            speeds=self.speeds,
-            controllers=(named(experiment.controllers, self.controller),),
-            scenarios=(named(experiment.scenarios, self.scenario),),
-            seeds=(self.seed,),
-            batches=(),
-        )
-
-    @property
-    def depends_on(self) -> Cell | None:
-        """The cell that learns what this one uses: the torque library, or the identified model."""
-        if self.practice or not depends_on_learning(self.spec):
-            return None
-        practice = bool(self.experiment.commands)
-        return dataclasses.replace(self, controller="ilc", practice=practice)
-
-    @property
-    def steps(self) -> int:
-        """Time steps of the simulation."""
-        schedule = self.schedule
-        return round((schedule.baseline + schedule.learning) / self.world.timestep)

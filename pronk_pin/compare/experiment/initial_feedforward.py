@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,7 @@ from ...control import (
     model_feedforward,
     phase_grid,
 )
-from ...errors import FileProblem, InvalidInput
+from ...errors import FileProblem, InvalidInput, SpeedOutOfRange
 from ...gait import Gait
 from ...robot import Robot
 from ..metrics import steady
@@ -113,12 +113,32 @@ def known_library(spec: ControllerSpec, robot: Robot, learned: xr.Dataset | None
     return library
 
 
-def check_library(library: TorqueLibrary, robot: Robot) -> None:
-    """Refuse torques that another robot has learned.
+def check_library(
+    library: TorqueLibrary,
+    robot: Robot,
+    planned: Callable[[Sequence[float]], Sequence[Gait]] | None = None,
+) -> None:
+    """Refuse torques that another robot has learned, or for other gaits.
+
+    Args:
+        library: The torques.
+        robot: The robot.
+        planned: Gaits at some speeds, as the robot is to play them; by default they are not looked
+            at.
 
     Raises:
         InvalidInput: They are.
     """
+    if planned is not None and library.gaits:
+        try:
+            here = tuple(gait.sha256 for gait in planned(library.speeds.tolist()))
+        except SpeedOutOfRange:
+            here = ()
+        if here != library.gaits:
+            raise InvalidInput(
+                "this torque library was learned for other gaits than are played here: of another "
+                "gait library, apex or base; build one for these, with pronk-pin ilc build-library"
+            )
     joints = library.torque.shape[-1]
     if library.robot not in ("", robot.name) or joints != robot.nu:
         whose = f"of {library.robot}" if library.robot else f"for {joints} joints"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -351,12 +351,34 @@ def robots(
         Values, NaN where the robot fell (but for the metric `upright` itself).
     """
     rows = in_family(summary[summary["controller"] == controller], scenario)
-    values = _pivot(rows[(rows["metric"] == metric) & (rows["joint"] == joint)])
+    # As arrays: reports ask for hundreds of these tables.
+    columns = {name: rows[name].to_numpy() for name in ("scenario", "seed", "speed", "value")}
+    metrics = rows["metric"].to_numpy()
+    values = _pivot(columns, (metrics == metric) & (rows["joint"].to_numpy() == joint))
     if metric == "upright":
         return values
-    upright = _pivot(rows[rows["metric"] == "upright"]).reindex_like(values)
+    upright = _pivot(columns, metrics == "upright").reindex_like(values)
     return values.where(upright != 0.0)
 
 
-def _pivot(rows: pd.DataFrame) -> pd.DataFrame:
-    return rows.set_index(["scenario", "seed", "speed"])["value"].unstack("speed")
+def _pivot(columns: Mapping[str, Any], chosen: BoolArray) -> pd.DataFrame:
+    """Values of the rows that are chosen, a row a unit, a column a speed; NaN where there is none.
+
+    Raises:
+        ValueError: There are two of a robot.
+    """
+    scenario, seed, speed, value = (columns[name][chosen] for name in columns)
+    names = list(zip(scenario, seed, strict=True))
+    units, speeds = sorted(set(names)), np.unique(speed.astype(float))
+    place = {unit: k for k, unit in enumerate(units)}
+    at = np.array([place[name] for name in names], dtype=int), np.searchsorted(speeds, speed)
+    if len(set(zip(*at, strict=True))) < len(names):
+        raise ValueError("two values of a robot")
+    table = np.full((len(units), len(speeds)), np.nan)
+    table[at] = value
+    index = [[unit[k] for unit in units] for k in (0, 1)]
+    return pd.DataFrame(
+        table,
+        pd.MultiIndex.from_arrays(index, names=["scenario", "seed"]),
+        pd.Index(speeds, name="speed"),
+    )

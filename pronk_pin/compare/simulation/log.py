@@ -144,6 +144,11 @@ class TickLog:
         quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
         return roll_pitch_yaw(rotation_matrix(quaternion))
 
+    def take_over(self, before: TickLog, ticks: int) -> None:
+        """Take the first ticks, which were felt late, of another log of the same robots."""
+        for channel, others in zip(self._channels, before._channels, strict=True):
+            channel[:, :ticks] = others[:, :ticks]
+
     def rewind(self, rows: IntArray, start: IntArray, ticks: int) -> None:
         """Move the ticks from `start` (m,) on to the beginning, as the first of the next phase."""
         kept = np.minimum(start[:, None] + np.arange(ticks), self.size - 1)  # (m, ticks)
@@ -317,6 +322,17 @@ class StrideLog:
         self["tilt"][at], self["heading"][at] = tilt, heading
         self["flight_reference"][at] = flight_reference
         self.count[rows] = np.minimum(self.count[rows] + 1, self._strides - 1)
+
+    @property
+    def full(self) -> bool:
+        """Whether a robot has no room for another stride."""
+        return bool(np.any(self.count >= self._strides - 1))
+
+    def restart(self) -> None:
+        """Forget all strides, and number the next ones from 0."""
+        self.count[:] = 0
+        for array in self._ticks.values():
+            array[:] = np.nan
 
     def finish(self, upright: BoolArray) -> None:
         """End the log; a fall in an unfinished stride counts for the last finished one."""

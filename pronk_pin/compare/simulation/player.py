@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -38,6 +39,12 @@ from .playback import (
     ServoPlayback,
 )
 
+PIECE = 10
+"""Most ticks that are played in one go where somebody is asked before each."""
+
+BeforePiece: TypeAlias = Callable[[IntArray, Tape, int], object]
+"""Called before ticks are played in one go: with which robots (m,), their tapes, and the tick."""
+
 
 class Player:
     """Plays tapes of n robots, and logs the motion, the torques and the sensors' readings.
@@ -64,6 +71,7 @@ class Player:
         falls: Detects falls.
         upright: Which robots have not fallen, shape (n,).
         late: Ticks by which their last touchdowns were felt late, as far as they know, shape (n,).
+        before_piece: Called before each `PIECE` ticks at most; None plays as many as can be.
     """
 
     def __init__(
@@ -124,6 +132,24 @@ class Player:
         self._sensor_late, self._reference_end = np.zeros((2, n), dtype=np.intp)  # of each flight
         self.falls = FallDetector(gaits)
         self.upright = np.ones(n, dtype=bool)
+        self.before_piece: BeforePiece | None = None
+
+    def take_over(self, before: Player) -> None:
+        """Go on where another player of the same robots has got to, at their touchdowns.
+
+        What the world is in, the commands on their way to the motors, what was felt late, and who
+        has fallen is as it was; trunks are locked.
+        """
+        world, others, felt = self.world, before.world, int(before.late.max())
+        rows = np.arange(world.n)
+        world.reset(others.base, others.joints, others.base_rate, others.joint_rates)
+        world.force[:] = others.force
+        self.motors.take_over(before.motors, before.log.torque(rows, slice(felt - 1, felt))[:, 0])
+        self.log.take_over(before.log, felt)
+        if self.sensed is not self.log:
+            self.sensed.take_over(before.sensed, felt)
+        self.late[:], self.upright[:] = before.late, before.upright
+        self.before_piece = before.before_piece
 
     def play(self, rows: IntArray, tape: Tape, *, part: int | None) -> IntArray:
         """Play tapes into the log until they end, or a flight's touchdown is sensed.
@@ -145,6 +171,9 @@ class Player:
         while going.size:
             who, end = rows[going], int(tape.length[going].max())
             stop = min(playback.next_stop(who, tick, part), end)
+            if self.before_piece is not None:
+                self.before_piece(who, tape, tick)
+                stop = min(stop, tick + PIECE)
             if stop > tape.ticks:
                 tape = tape.held(end)
             segment = Segment(who, _excerpt(tape, going, slice(tick, stop)), tick, part)

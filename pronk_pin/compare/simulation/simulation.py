@@ -14,7 +14,8 @@ import numpy as np
 import xarray as xr
 
 from ..._checks import Interval, flag, instance_of, known_name, whole
-from ..._typing import Array, IntArray
+from ..._typing import Array, BoolArray, IntArray
+from ..._workers import count_steps
 from ...control import (
     Controller,
     ControllerSpec,
@@ -26,7 +27,7 @@ from ...control import (
 from ...errors import InvalidInput
 from ...gait import Gait, known_gaits
 from ...robot import BASES, Robot
-from ..world import Scenario
+from ..world import Scenario, World
 from .dataset import to_dataset
 from .log import StrideLog
 from .memory import check_memory
@@ -109,19 +110,8 @@ class Simulation:
         )
         self._command = command
         self._threads = threads
-        self.player = Player(
-            robot,
-            gaits,
-            spec,
-            scenario,
-            ticks=self.controller.max_ticks,
-            rng=rng.spawn(1)[0],
-            base=base,
-            balance=self.controller.balance,
-            tick_loop=self.controller.tick_loop,
-            chunked=chunked,
-        )
-        self.world, self.upright = self.player.world, self.player.upright
+        self._chunked, self._base = chunked, base
+        self.player = self._player(scenario, rng)
         self.strides = StrideLog(
             gaits,
             schedule.duration,
@@ -131,6 +121,80 @@ class Simulation:
         )
         self._clock = np.zeros(n, dtype=np.intp)  # ticks since the first stride began
         self._stand(robot, rng)
+
+    def _player(self, scenario: Scenario, rng: np.random.Generator) -> Player:
+        return Player(
+            self.controller.robot,
+            self._gaits,
+            self.controller.spec,
+            scenario,
+            ticks=self.controller.max_ticks,
+            rng=rng.spawn(1)[0],
+            base=self._base,
+            balance=self.controller.balance,
+            tick_loop=self.controller.tick_loop,
+            chunked=self._chunked,
+        )
+
+    @property
+    def world(self) -> World:
+        """The robots in the scenario's engine."""
+        return self.player.world
+
+    @property
+    def upright(self) -> BoolArray:
+        """Which robots have not fallen, shape (n,)."""
+        return self.player.upright
+
+    def change_scenario(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """Go on in another scenario from the robots' touchdowns on, with all that they have.
+
+        Robots and motors keep their state, controllers what they estimate and have learned. Trunks
+        must be locked, and time steps the same.
+
+        Args:
+            scenario: The scenario.
+            rng: Source of the sensors' noise in it.
+        """
+        self._check_goes_on(scenario)
+        player = self._player(scenario, rng)
+        player.take_over(self.player)
+        self.player = player
+
+    def change_controller(
+        self, spec: ControllerSpec, command: SpeedCommand, rng: np.random.Generator
+    ) -> None:
+        """Go on under another controller from the robots' touchdowns on, with a memory of its own.
+
+        Args:
+            spec: The controller.
+            command: The speeds that it follows, and its memory.
+            rng: Source of the sensors' noise from then on.
+        """
+        scenario, before = self.world.scenario, self.controller
+        self._check_goes_on(scenario)
+        if self._command is not None:
+            command.speed[:] = self._command.speed  # of the gaits that they land in
+        self.controller = Controller(
+            before.robot,
+            command.first_gaits,
+            spec,
+            timestep=self._dt,
+            **command.initial_feedforward._asdict(),
+            command=command,
+        )
+        self.controller.take_over(before)
+        self._command = command
+        player = self._player(scenario, rng)
+        player.take_over(self.player)
+        self.player = player
+
+    def _check_goes_on(self, scenario: Scenario) -> None:
+        if self._base != "locked" or scenario.timestep != self._dt:
+            raise InvalidInput(
+                "a simulation goes on in another scenario, or under another controller, on base "
+                f"'locked' with the same time step of {self._dt:g} s; make a new one"
+            )
 
     def _stand(self, robot: Robot, rng: np.random.Generator) -> None:
         """Set the robots on the ground in the posture of their first stride."""
@@ -149,38 +213,42 @@ class Simulation:
         """Simulate to the end of the schedule.
 
         Args:
-            progress: Called with the number of steps done since the last call.
+            progress: Called with the number of steps done since the last call; by default whoever
+                listens to this process (`_workers.listening`) is told.
             before_stride: Called with the robots that are about to begin a stride, each as often.
         """
         schedule = self.schedule
         steps = round((schedule.baseline + schedule.learning) / self._dt)
         done, lock = 0, threading.Lock()
+        tell = self._count if progress is None else progress
 
         def report() -> None:
             nonlocal done
             with lock:
                 before, done = done, min(int(self._clock.mean()), steps)
-                if progress is not None and done > before:
-                    progress(done - before)
+                if done > before:
+                    tell(done - before)
 
         def strides(rows: IntArray) -> None:
             while (going := rows[self._clock[rows] < steps]).size:
                 if before_stride is not None:
                     before_stride(going)
-                late = self.player.late[going]
-                for ticks in np.unique(late):  # those that are equally late together
-                    self._stride(going[late == ticks], steps=steps, late=int(ticks))
+                start = self._clock[going]
+                learning = start >= round(schedule.baseline / self._dt)
+                self._strides(going, learning, self._seconds(steps - start))
                 report()
 
         with self.world.running(), ThreadPoolExecutor(self._threads) as pool:
-            self._startup()
+            self.start_up()
             shares = np.array_split(np.arange(len(self._gaits)), self._threads)
             side_by_side = pool.map if self._threads > 1 else map
             list(side_by_side(strides, shares))  # an error in a thread is raised here
-        if progress is not None:
-            progress(steps - done)
+        tell(steps - done)
         self.strides.finish(self.upright)
         return self.strides
+
+    def _count(self, steps: int) -> None:
+        count_steps(steps * len(self._gaits))
 
     @property
     def control_time(self) -> ControlTime:
@@ -189,7 +257,17 @@ class Simulation:
         seconds = events.seconds + (0.0 if loop is None else loop.time.seconds)
         return ControlTime(seconds, int(self._clock.sum()))
 
-    def _startup(self) -> None:
+    @property
+    def clock(self) -> float:
+        """Simulated time since the first stride began, of the robot that is ahead [s]."""
+        return float(self._clock.max() * self._dt)
+
+    def restart_log(self) -> None:
+        """Forget all strides, and count strides and time from here on."""
+        self.strides.restart()
+        self._clock -= self._clock.max()
+
+    def start_up(self) -> None:
         """Stand; the last ticks are as if the first stance's touchdown had been sensed late."""
         rows, late = np.arange(len(self._gaits)), self.controller.spec.touchdown_ticks
         ticks = round(self.schedule.startup / self._dt) + late
@@ -197,7 +275,23 @@ class Simulation:
             self.player.play(rows, self.controller.stand(len(piece)), part=None)
         self.player.rewind(rows, np.full(len(rows), len(piece) - late))
 
-    def _stride(self, rows: IntArray, *, steps: int, late: int) -> None:
+    def stride(self, *, learning: bool) -> None:
+        """Simulate one more stride of every robot, beyond any schedule, after `start_up`.
+
+        Args:
+            learning: Whether they learn from the one before.
+        """
+        rows = np.arange(len(self._gaits))
+        self._strides(rows, np.full(len(rows), learning), np.zeros(len(rows)))
+
+    def _strides(self, rows: IntArray, learning: BoolArray, remaining: Array) -> None:
+        """Simulate one stride of some robots, with so much to go (m,) [s]."""
+        late = self.player.late[rows]
+        for ticks in np.unique(late):  # those that are equally late together
+            alike = late == ticks
+            self._stride(rows[alike], learning[alike], remaining[alike], late=int(ticks))
+
+    def _stride(self, rows: IntArray, learning: BoolArray, remaining: Array, *, late: int) -> None:
         """Simulate one stride of some robots, from touchdown to touchdown.
 
         The first was felt late by so many ticks.
@@ -205,9 +299,8 @@ class Simulation:
         controller, strides, player = self.controller, self.strides, self.player
         log = player.log
         start = self._clock[rows]
-        learning = start >= round(self.schedule.baseline / self._dt)
-        learning &= controller.learns
-        strides.begin(rows, self._seconds(start), learning, remaining=self._seconds(steps - start))
+        learning = learning & controller.learns
+        strides.begin(rows, self._seconds(start), learning, remaining=remaining)
 
         with controller.time.measured():
             tape = controller.touchdown(rows, learning, late=late)

@@ -13,8 +13,9 @@
 
 Outside the engine, the same for all of them: delays, speed-torque curves and sensors. Inside it is
 the rest of a scenario: rotors, damping and dry friction, torque constants (which act on what limits
-have left of a torque), payload, slope, contact, and pushes (`push_force`, for which a state needs
-its time). The suite
+have left of a torque), payload, slope, contact, and pushes: those of the scenario (`push_force`,
+for which a state needs its time), and those that are asked for (`World.push`, which an engine may
+refuse). The suite
 `tests/compare/world/test_engines.py` holds any engine to these promises.
 """
 
@@ -148,6 +149,22 @@ class World(Protocol):
 
     def restart(self, rows: IntArray) -> None:
         """Reset robots with states that are not finite to rest, so that the others go on."""
+
+    def push(self, rows: IntArray, impulse: Array, duration: float) -> None:
+        """Push robots' trunks at their centres of mass, from the next tick on; a reset ends it.
+
+        Args:
+            rows: Which robots.
+            impulse: What the push gives in all, world frame [N s], shape (m, 3) or (3,).
+            duration: How long its force lasts [s], a tick at least.
+
+        Raises:
+            InvalidInput: The engine cannot push.
+        """
+        raise InvalidInput(
+            f"engine '{self.scenario.engine}' cannot push a robot that is asked for while it goes; "
+            "take engine mujoco"
+        )
 
     def running(self) -> AbstractContextManager[object]:
         """Context to play in, where the engine needs one."""

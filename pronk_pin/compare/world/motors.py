@@ -38,6 +38,17 @@ class Motors:
         delay = np.arange(self._queue.shape[1])
         self._queue[rows] = queue[np.arange(len(rows))[:, None], ticks[:, None] + delay]
 
+    def take_over(self, before: Motors, torque: Array) -> None:
+        """Go on with the commands that are on their way to other motors of the same robots.
+
+        Args:
+            before: The others.
+            torque: What they gave last [N m], shape (n, 12): it is held where the delay grows.
+        """
+        delay, others = self._queue.shape[1], before._queue
+        held = np.repeat(torque[:, None], max(delay - others.shape[1], 0), axis=1)
+        self._queue[:] = np.concatenate([held, others], axis=1)[:, -delay or others.shape[1] :]
+
     def drive(self, rows: IntArray, command: Array, rates: Array) -> Array:
         """Compute the torques of robots at this tick, after delay and limits [N m], shape (m, 12).
 
@@ -59,6 +70,46 @@ class Motors:
             return torque
         limit = self._tau_max * np.clip((none - np.abs(rates)) / (none - full), 0.0, 1.0)
         return np.asarray(np.clip(torque, -limit, limit))
+
+
+class Pushes:
+    """Pushes on the trunks' centres of mass of n robots that are asked for while they go.
+
+    A push is a constant force; it lasts while its robot goes on, however often a motion is played.
+
+    Args:
+        n: Number of robots.
+        timestep: Length of a tick [s].
+    """
+
+    def __init__(self, n: int, timestep: float) -> None:
+        self._timestep = timestep
+        self._force = np.zeros((n, 3))
+        self._left = np.zeros(n, dtype=np.intp)  # ticks to go
+
+    def begin(self, rows: IntArray, impulse: Array, duration: float) -> None:
+        """Begin pushes of robots that give an impulse each (m, 3) [N s], in place of any before.
+
+        Args:
+            rows: Which robots.
+            impulse: In the world frame [N s], shape (m, 3) or (3,).
+            duration: How long they last [s], a tick at least.
+        """
+        ticks = max(round(duration / self._timestep), 1)
+        self._force[rows], self._left[rows] = impulse / (ticks * self._timestep), ticks
+
+    def force(self, rows: IntArray, ticks: int) -> Array | None:
+        """Forces in the next ticks, world frame [N], shape (m, ticks, 3); None without any."""
+        acts = np.arange(ticks) < self._left[rows, None]
+        return acts[..., None] * self._force[rows, None] if acts.any() else None
+
+    def advance(self, rows: IntArray, ticks: IntArray) -> None:
+        """Take note that robots have gone on by so many ticks (m,)."""
+        self._left[rows] = np.maximum(self._left[rows] - ticks, 0)
+
+    def clear(self) -> None:
+        """End all pushes."""
+        self._left[:] = 0
 
 
 def push_force(scenario: Scenario, time: Array) -> Array:

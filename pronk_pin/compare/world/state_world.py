@@ -10,6 +10,7 @@ from ..._checks import Interval, whole
 from ..._typing import Array, BoolArray, IntArray
 from ...robot import Robot
 from .engine import Motion, World
+from .motors import Pushes, push_force
 from .scenario import Scenario
 
 
@@ -65,6 +66,7 @@ class StateWorld(World):
         self._base, self._base_rate = trunk.x_z, trunk.x_z_rate
         self._state = np.zeros((self.n, size))
         self.force = np.zeros((self.n, len(robot.foot_names), 3))
+        self._pushes = Pushes(self.n, scenario.timestep)
         self.reset(np.zeros((self.n, 2)), np.tile(robot.standing[7:], (self.n, 1)))
 
     def reset(
@@ -83,6 +85,27 @@ class StateWorld(World):
         state[:, self._base], state[:, self._joints] = base, joints
         state[:, self._base_rate], state[:, self._rates] = base_rate, joint_rates
         self.force[:] = 0.0
+        self._pushes.clear()
+
+    def push(self, rows: IntArray, impulse: Array, duration: float) -> None:
+        """See `World`."""
+        self._pushes.begin(rows, impulse, duration)
+
+    def _push_force(self, rows: IntArray, time: Array, ticks: int) -> Array | None:
+        """Forces that push trunks [N], world frame, shape (m, ticks, 3); None where none does.
+
+        Args:
+            rows: Which robots.
+            time: When the first tick begins, by their own clocks [s], shape (m,).
+            ticks: How many.
+        """
+        asked = self._pushes.force(rows, ticks)
+        if not self.scenario.pushes:
+            return asked
+        planned = push_force(
+            self.scenario, time[:, None] + self.scenario.timestep * np.arange(ticks)
+        )
+        return planned if asked is None else planned + asked
 
     def _motion(self, path: Array, force: Array, finite: BoolArray) -> Motion:
         """The motion along states (m, ticks + 1, nstate), with forces on the feet."""
@@ -104,6 +127,7 @@ class StateWorld(World):
         m = np.arange(len(rows))
         self.force[rows] = motion.force[m, ticks - 1]
         self._state[rows] = motion.path[m, ticks]
+        self._pushes.advance(rows, ticks)
 
     def restart(self, rows: IntArray) -> None:
         """See `World`."""

@@ -22,8 +22,11 @@ from ..._typing import Array, IntArray
 from .guard import Memory
 from .torque_library import TorqueLibrary
 
-_SWEEPS = 20
-"""Minimisations along each condition in turn; the next stride goes on from there."""
+_SWEEPS = 200
+"""Most minimisations along each condition in turn: conditions that need nearly the same torque take
+many. The next stride goes on from there."""
+_STILL = 1e-4
+"""Change of a place in a sweep, over the distance of two nodes, below which it is found."""
 _PRACTISED_FEEDBACK = 0.5
 """Share c of the practised feedback that is expected to be given again."""
 FIRST_STRIDES = 4
@@ -88,13 +91,16 @@ class ConditionEstimate:
         here = zip(self.values[row], self._axes, strict=True)
         place = np.array([np.interp(value, axis, np.arange(len(axis))) for value, axis in here])
         hats = [_hat(p, len(x)) for p, x in zip(place, self._axes, strict=True)]
-        for _ in range(_SWEEPS if len(hats) > 1 else 1):
+        for _ in range(_SWEEPS):
+            before = place.copy()
             for k, axis in enumerate(self._axes):
                 # Torques along this condition alone: weights of the nodes, (m_k, nodes).
                 along = [np.eye(len(axis)) if j == k else hat[None] for j, hat in enumerate(hats)]
                 weights = _outer(along)
                 place[k] = _least(weights @ gram @ weights.T, weights @ projected)
                 hats[k] = _hat(place[k], len(axis))
+            if len(hats) == 1 or np.abs(place - before).max() < _STILL:
+                break
         pairs = zip(place, self._axes, strict=True)
         return np.array([np.interp(p, np.arange(len(x)), x) for p, x in pairs])
 

@@ -29,7 +29,7 @@ LANDS_ALIKE = 5e-4
 sensed at whole milliseconds."""
 _ROUNDING = 1e-6
 _STORED = ("speeds", "torque", "spread", "flight", "feedback")
-_AGAIN = "learn again, and save it with TorqueLibrary.save"
+_AGAIN = "learn again: pronk-pin ilc build-library, or TorqueLibrary.save"
 
 
 class InitialFeedforward(NamedTuple):
@@ -68,6 +68,7 @@ class TorqueLibrary(Displayed):
         home: The values that a robot begins with, by name; by default each condition's value in the
             middle, the lower of two.
         robot: Name of the robot that learned them; empty where that is not on record.
+        gaits: SHA-256 of the gait at each speed for which they were learned; likewise.
     """
 
     speeds: Array
@@ -78,6 +79,7 @@ class TorqueLibrary(Displayed):
     conditions: Mapping[str, Array] = field(default_factory=dict)
     home: Mapping[str, float] = field(default_factory=dict)
     robot: str = ""
+    gaits: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         keep = object.__setattr__
@@ -98,7 +100,7 @@ class TorqueLibrary(Displayed):
         nodes = {self.torque.shape[: 1 + d], (len(self.speeds), *map(np.size, axes.values()))}
         shapes = {self.torque.shape, self.spread.shape, np.asarray(self.feedback).shape}
         alike = len(shapes) == 1 and nodes == {self.flight.shape}
-        if not alike or not self.flight.size:
+        if not alike or not self.flight.size or len(self.gaits) not in (0, len(self.speeds)):
             raise InvalidInput(
                 "a torque library needs one torque, one spread and one flight for each speed"
                 + (" and condition" if axes else "")
@@ -267,7 +269,9 @@ class TorqueLibrary(Displayed):
             for values in (self.torque, self.spread, self.feedback)
         )
         flight = self.flight_at(speeds, conditions)
-        return TorqueLibrary(speeds, torque, spread, flight, feedback, robot=self.robot)
+        return TorqueLibrary(
+            speeds, torque, spread, flight, feedback, robot=self.robot, gaits=self.gaits
+        )
 
     def _places(self, speeds: Array) -> Array:
         """Fractional indices of speeds into those of the library, shape (m,)."""
@@ -308,7 +312,9 @@ class TorqueLibrary(Displayed):
     def without(self, speed: float) -> TorqueLibrary:
         """The library without the learned speed nearest to the given one."""
         kept = np.arange(len(self.speeds)) != int(np.argmin(np.abs(self.speeds - speed)))
-        return replace(self, **{name: getattr(self, name)[kept] for name in _STORED})
+        rest = {name: getattr(self, name)[kept] for name in _STORED}
+        gaits = tuple(gait for gait, keep in zip(self.gaits, kept, strict=False) if keep)
+        return replace(self, **rest, gaits=gaits)
 
     def left_out(self, speeds: Array) -> tuple[InitialFeedforward, BoolArray]:
         """Initial feedforward at learned speeds (m,), each interpolated from its neighbours only.
@@ -362,6 +368,8 @@ class TorqueLibrary(Displayed):
             arrays["home"] = np.array([self.home[name] for name in self.conditions])
         if self.robot:
             arrays["robot"] = np.array(self.robot)
+        if self.gaits:
+            arrays["gaits"] = np.array(self.gaits)
         return arrays
 
     def save(self, path: Path | str) -> None:
@@ -393,7 +401,8 @@ class TorqueLibrary(Displayed):
         home = arrays.numbers("home", len(names)) if names else np.zeros(0)
         begun = dict(zip(names, home.tolist(), strict=True))
         robot = arrays.text("robot") if "robot" in arrays else ""
+        gaits = tuple(arrays.texts("gaits")) if "gaits" in arrays else ()
         try:
-            return cls(speeds, torque, spread, flight, feedback, conditions, begun, robot)
+            return cls(speeds, torque, spread, flight, feedback, conditions, begun, robot, gaits)
         except InvalidInput as error:
             raise arrays.damaged(error) from error

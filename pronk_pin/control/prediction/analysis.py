@@ -8,10 +8,10 @@ that is affine in the record can be analysed. Terms follow Bristow, Tharayil and
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
-import scipy.linalg
+import scipy.sparse
 import scipy.sparse.linalg
 
 from ..._typing import Array
@@ -25,6 +25,9 @@ GAIN_ERRORS = (0.7, 1.3)
 DELAYS = (2, 5, 10)
 """Delays of the feedforward, in samples of the phase grid, for which stability is asked."""
 _POWERS = 7
+
+Basis: TypeAlias = scipy.sparse.csr_array
+"""Columns that span some feedforwards; each has few entries."""
 
 
 class QuasiStatic(NamedTuple):
@@ -153,44 +156,48 @@ def quasi_static(law: LearningLaw, model: LiftedModel) -> QuasiStatic:
     return QuasiStatic(memory, added / memory if memory != 0.0 else np.inf)
 
 
-def iteration(law: LearningLaw, model: LiftedModel, basis: Array) -> Array:
+def iteration(law: LearningLaw, model: LiftedModel, basis: Basis) -> Array:
     """Matrix T of the iteration `z_{k+1} = T z_k + c` of z = (u, x), u in an orthonormal basis.
 
     One column at a time the law is asked for its answer to a unit of u or x, less that to zero.
+    What the model makes of a unit is a column of its matrices, so nothing is multiplied.
 
     Args:
         law: The law.
         model: The lifted model.
-        basis: Columns that span the feedforwards, shape (samples * joints, m).
+        basis: Columns that span the feedforwards, sparse, shape (samples * joints, m).
 
     Returns:
         Shape (m + states, m + states).
     """
-    size, states = basis.shape[1], len(model.A)
-    none = model.record(*np.zeros((3, basis.shape[0])))
-    learned_from_none = law.update(none).reshape(1, -1)
-    columns = []
-    for z in np.array_split(np.eye(size + states), max(1, (size + states) // 128)):
-        feedforward = (z[:, :size] @ basis.T).reshape(-1, *model.shape)
-        record = model.stride(feedforward, none, z[:, size:])
-        learned = law.update(_all_of_robot_0(record)).reshape(len(z), -1) - learned_from_none
-        landed = model.land(feedforward, none, z[:, size:])
-        columns.append(np.hstack([learned @ basis, landed]))
-    return np.asarray(np.vstack(columns).T, dtype=float)
+    rows, size = basis.shape
+    none = np.zeros((1, rows))
+    learned_from_none = law.update(model.record(none, none, none)).reshape(1, -1)
+    units = (
+        -np.vstack([(model.angle @ basis).T, model.angle_start.T]),
+        -np.vstack([(model.rate @ basis).T, model.rate_start.T]),
+        np.vstack([basis.T.toarray(), np.zeros((len(model.A), rows))]),
+    )
+    learned = []
+    for part in np.array_split(np.arange(size + len(model.A)), max(1, len(units[0]) // 128)):
+        record = _all_of_robot_0(model.record(*(unit[part] for unit in units)))
+        learned.append((law.update(record).reshape(len(part), -1) - learned_from_none) @ basis)
+    landed = np.vstack([(model.B @ basis).T, model.A.T])
+    return np.asarray(np.hstack([np.vstack(learned), landed]).T, dtype=float)
 
 
-def symmetric_basis(samples: int, joints: int, robot: Robot | None = None) -> Array:
+def symmetric_basis(samples: int, joints: int, robot: Robot | None = None) -> Basis:
     """Orthonormal basis of the left-right symmetric feedforwards, shape (samples * joints, m).
 
     Joints of mirror images turn alike or in opposite senses, as hips do. Without a robot, every
     feedforward.
     """
     if robot is None:
-        return np.eye(samples * joints)
+        return scipy.sparse.eye_array(samples * joints, format="csr")
     images = mirrored(robot, np.eye(joints))  # of each joint
     left = [3 * leg + joint for leg, _ in mirror(robot).pairs for joint in range(3)]
     sides = np.sqrt(0.5) * (np.eye(joints) + images)[left].T
-    return np.asarray(np.kron(np.eye(samples), sides))
+    return scipy.sparse.kron(scipy.sparse.eye_array(samples), sides, format="csr")
 
 
 def _all_of_robot_0(record: StrideRecord) -> StrideRecord:
@@ -225,7 +232,7 @@ def _radius(operator: Array) -> float:
     start = np.random.default_rng(0).standard_normal(len(operator))
     try:
         largest = scipy.sparse.linalg.eigs(
-            operator, k=4, ncv=60, v0=start, tol=1e-6, return_eigenvectors=False, maxiter=2000
+            operator, k=4, ncv=60, v0=start, tol=1e-6, return_eigenvectors=False, maxiter=300
         )
     except scipy.sparse.linalg.ArpackNoConvergence:  # a law without a filter: many are alike
         largest = np.linalg.eigvals(operator)
@@ -233,13 +240,26 @@ def _radius(operator: Array) -> float:
 
 
 def _norm(operator: Array) -> float:
-    return float(np.sqrt(scipy.linalg.eigvalsh(operator.T @ operator)[-1]))
+    """Largest singular value."""
+    if len(operator) < 200:
+        return float(np.linalg.norm(operator, 2))
+    start = np.random.default_rng(0).standard_normal(len(operator))
+    square = scipy.sparse.linalg.LinearOperator(
+        operator.shape, matvec=lambda u: operator.T @ (operator @ u), dtype=float
+    )
+    try:
+        (largest,) = scipy.sparse.linalg.eigsh(
+            square, k=1, ncv=40, v0=start, tol=1e-9, return_eigenvectors=False
+        )
+    except scipy.sparse.linalg.ArpackNoConvergence:
+        return float(np.linalg.norm(operator, 2))
+    return float(np.sqrt(largest))
 
 
 def _transient(operator: Array, size: int) -> float:
     """Largest 2-norm of the powers 1, 2, 4, ... 64 of the operator, from u to u."""
     largest, power = 0.0, operator
-    for _ in range(_POWERS):
+    for k in range(_POWERS):
+        power = power @ power if k else power
         largest = max(largest, _norm(power[:size, :size]))
-        power = power @ power
     return largest

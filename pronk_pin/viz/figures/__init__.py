@@ -4,6 +4,7 @@ Comes in: summaries, strides, gaits, explanations.
 Goes out: figures, or files of them.
 """
 
+from .condition_figure import estimated_conditions
 from .driving_figure import driving_figure
 from .explanation_figure import write_explanation_figure
 from .gait_figures import write_gait_figures
@@ -29,6 +30,7 @@ __all__ = [
     "driving_figure",
     "errors_by_seed",
     "errors_by_speed",
+    "estimated_conditions",
     "gains_figure",
     "heat_map",
     "knowledge_ladder",

@@ -23,7 +23,7 @@ import webbrowser
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from string import Template
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -75,6 +75,12 @@ _START = """\
 </script>
 """
 
+
+SCRIPT = "text/javascript; charset=utf-8"
+"""Kind of a script."""
+
+Route: TypeAlias = tuple[str, type[tornado.web.RequestHandler], dict[str, Any]]
+"""A path, who answers to it, and with what."""
 
 DURATION = Interval(0, 1e6, "s", above=True)
 """For how long a page can be shown."""
@@ -232,20 +238,42 @@ class LiveServer:
         self._loop.close()
 
     def _application(self) -> tornado.web.Application:
+        return _Application(
+            self, self.routes(), log_function=lambda handler: None, **self.settings()
+        )
+
+    def settings(self) -> dict[str, Any]:
+        """Settings of tornado's."""
+        return {}
+
+    def start_script(self) -> str:
+        """The `<script>` elements that start the page."""
         options = {name: list(values) for name, values in self.menu.options.items()}
-        start = Template(_START).substitute(
+        return Template(_START).substitute(
             options=script_json(options), first=script_json(dict(self.menu.first))
         )
-        script = "text/javascript; charset=utf-8"
-        served: list[tuple[str, type[tornado.web.RequestHandler], dict[str, Any]]] = [
-            ("/", _Bytes, _text(page(self.scene.title, start), "text/html; charset=utf-8")),
-            ("/viewer.js", _Bytes, _text(viewer_source(), script)),
-            ("/player.js", _Bytes, _text(player_source(), script)),
-            ("/robot", _Bytes, {"data": self._robot, "kind": "application/octet-stream"}),
+
+    def routes(self) -> list[Route]:
+        """What is served, and by whom."""
+        html = page(self.scene.title, self.start_script())
+        return [
+            ("/", Bytes, text_as_bytes(html, "text/html; charset=utf-8")),
+            ("/viewer.js", Bytes, text_as_bytes(viewer_source(), SCRIPT)),
+            ("/player.js", Bytes, text_as_bytes(player_source(), SCRIPT)),
+            ("/robot", Bytes, {"data": self._robot, "kind": "application/octet-stream"}),
             ("/film", _Film, {"server": self}),
             ("/stream", _Stream, {"pages": self._pages, "server": self}),
         ]
-        return _Application(self, served, log_function=lambda handler: None)
+
+    def refuses(self, request: HTTPServerRequest) -> str:
+        """Whom a request is refused to: another host, a page of another origin; empty for none."""
+        arrived_at = _arrived_at(request)
+        host, origin = (request.headers.get(name) for name in ("Host", "Origin"))
+        if not self.hosts.answers(host, arrived_at=arrived_at):
+            return f"the host {host!r}"
+        if origin is not None and not self.hosts.trusts(origin, arrived_at=arrived_at):
+            return f"pages of {origin!r}"
+        return ""
 
     async def film(self, choice: dict[str, str]) -> bytes:
         """The film of a choice; films are made one after the other, aside from the pages."""
@@ -266,13 +294,8 @@ class _Application(tornado.web.Application):
 
     def find_handler(self, request: HTTPServerRequest, **kwargs: Any) -> Any:
         """Who answers a request: for another host, or a page of another origin, the refusal."""
-        hosts, arrived_at = self._server.hosts, _arrived_at(request)
-        host, origin = (request.headers.get(name) for name in ("Host", "Origin"))
-        if not hosts.answers(host, arrived_at=arrived_at):
-            refused = f"the host {host!r}"
-        elif origin is not None and not hosts.trusts(origin, arrived_at=arrived_at):
-            refused = f"pages of {origin!r}"
-        else:
+        refused = self._server.refuses(request)
+        if not refused:
             return super().find_handler(request, **kwargs)
         return self.get_handler_delegate(
             request, _Refusal, {"refused": refused, "url": self._server.url}
@@ -294,7 +317,7 @@ class _Refusal(tornado.web.RequestHandler):
         )
 
 
-class _Bytes(tornado.web.RequestHandler):
+class Bytes(tornado.web.RequestHandler):
     """Answers with the same bytes each time."""
 
     def initialize(self, data: bytes, kind: str) -> None:
@@ -372,7 +395,8 @@ def _arrived_at(request: HTTPServerRequest) -> str:
         return ""
 
 
-def _text(text: str, kind: str) -> dict[str, Any]:
+def text_as_bytes(text: str, kind: str) -> dict[str, Any]:
+    """A text as `Bytes` serves it."""
     return {"data": text.encode(), "kind": kind}
 
 

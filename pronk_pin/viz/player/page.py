@@ -23,7 +23,7 @@ def page(title: str, script: str) -> str:
 
 def viewer_source() -> str:
     """MeshCat's viewer, one JavaScript file."""
-    return _text("meshcat", "viewer/dist/main.min.js")
+    return data_text("meshcat", "viewer/dist/main.min.js")
 
 
 def player_source() -> str:
@@ -37,9 +37,10 @@ def script_json(value: object) -> str:
 
 
 def _data(name: str) -> str:
-    return _text(__package__, f"data/{name}")
+    return data_text(__package__, f"data/{name}")
 
 
-def _text(package: str, name: str) -> str:
+def data_text(package: str, name: str) -> str:
+    """A text file of a package, as it is installed."""
     with resources.as_file(resources.files(package).joinpath(name)) as path:
         return read_text(path, REINSTALL)

@@ -279,7 +279,29 @@ def _suite_figures(
         ),
         **_knowledge_figure(tables),
         **_learning_figures(results),
+        **_condition_figure(results),
     }
+
+
+def _condition_figure(results: Results) -> dict[str, tuple[Figure, str]]:
+    """The conditions that robots estimate, scenario by scenario, with its caption."""
+    experiment, found = results.experiment, {}
+    for scenario in experiment.scenario_names:
+        strides = {
+            name: results.all_strides(controller=name, scenario=scenario)
+            for name in experiment.controller_names
+            if experiment.controller(name).library
+        }
+        estimating = {name: those for name, those in strides.items() if "conditions" in those}
+        if estimating:
+            found[scenario] = estimating
+    if not found:
+        return {}
+    caption = (
+        "Where robots that begin with a torque library over conditions take themselves to be, from "
+        "the torques they need; mean and range over the robots, dashed: where they are."
+    )
+    return {"conditions": (figures.estimated_conditions(found), caption)}
 
 
 def _knowledge_figure(tables: Mapping[str, Overview]) -> dict[str, tuple[Figure, str]]:
@@ -339,6 +361,9 @@ def _world(
     found = scenario_figures(results, scenario)
     document.picture("errors", found["errors"], _CAPTIONS["errors"])
     document.picture("learning", found["learning"], _CAPTIONS["learning"])
+    if len(scenarios) == 1:
+        for name, (figure, caption) in _condition_figure(results).items():
+            document.picture(name, figure, caption)
     learns = {"pd", LEARNER} <= set(results.experiment.controller_names)
     if learns and of_papers_robot(summary):
         document.heading("Table I, beside the paper's", f"{scenario}-table", level=3)

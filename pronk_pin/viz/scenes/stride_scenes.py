@@ -161,6 +161,14 @@ def _robots(
     return SPEED, numbers(speeds), f"{speeds[at]:g}"
 
 
+_SHOWN = (
+    *("count", "start", "stance", "duration", "planned_duration", "learning", "upright"),
+    *("gait_speed", "landing_speed", "peak_error", "error", "reference", "feedforward", "feedback"),
+    *("base", "attitude", "tick_force"),
+)
+"""Variables of strides that scenes are made of."""
+
+
 @dataclass(frozen=True)
 class _Reader:
     """Makes the scenes of a result."""
@@ -220,18 +228,30 @@ class _Reader:
 
     def _strides(self, controller: str, choice: Choice) -> xr.Dataset:
         """The strides of one robot."""
+        by_command = COMMAND in choice
+        robot = choice[COMMAND if by_command else SPEED]
         digest = self.results.strides_digest
-        strides = _load(self.results, controller, choice[SCENARIO], digest)
-        if COMMAND in choice:
-            return strides.sel(command=choice[COMMAND])
-        speed = float(choice[SPEED])
-        return strides.isel(speed=nearest(list(strides["speed"].to_numpy()), speed, "speed"))
+        return _one_robot(self.results, controller, choice[SCENARIO], robot, by_command, digest)
+
+
+@lru_cache(maxsize=64)
+def _one_robot(
+    results: Results, controller: str, scenario: str, robot: str, by_command: bool, digest: str
+) -> xr.Dataset:
+    """The strides of one robot, by its speed or command; kept as `_load` keeps those of all."""
+    strides = _load(results, controller, scenario, digest)
+    if by_command:
+        return strides.sel(command=robot)
+    speeds = list(strides["speed"].to_numpy())
+    return strides.isel(speed=nearest(speeds, float(robot), "speed"))
 
 
 @lru_cache(maxsize=8)
 def _load(results: Results, controller: str, scenario: str, digest: str) -> xr.Dataset:
-    """Strides that are kept as long as the files, by their `digest`, are the same."""
-    return results.all_strides(controller=controller, scenario=scenario)
+    """Strides, as far as scenes show them; kept as long as the files, by their `digest`, are the
+    same."""
+    strides = results.all_strides(controller=controller, scenario=scenario)
+    return strides[[name for name in _SHOWN if name in strides]]
 
 
 def _windows(strides: xr.Dataset) -> list[str]:

@@ -162,7 +162,9 @@ def test_a_class_that_workers_do_not_find_in_the_script_is_named_as_a_cause(tmp_
             """
             if __name__ == "__main__":
                 from pronk_pin.compare import Experiment, Schedule, run_experiment
+                from pronk_pin.compare.execution import run
                 from pronk_pin.control import ControllerSpec
+                run.MAX_RETRIES = 1
                 class Law:
                     def update(self, record):
                         return record.feedforward
@@ -211,6 +213,23 @@ def test_what_was_finished_before_the_disk_was_full_is_kept(
     assert contents(folder) == contents(alone.folder)
 
 
+def test_a_run_that_is_killed_amid_its_work_and_taken_up_again_gives_the_same_files(
+    alone: Results, tmp_path: Path
+) -> None:
+    """Killed as soon as the first strides are there, and taken up by another process."""
+    folder = tmp_path / "killed"
+    process = begin(folder, workers=2)
+    deadline = time.monotonic() + 120.0
+    while not list(folder.glob("strides/*.nc")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert process.poll() is None
+    process.kill()
+    process.wait()
+    assert contents(folder) != contents(alone.folder)
+    run_experiment(EXPERIMENT, folder, workers=1, progress=False)
+    assert contents(folder) == contents(alone.folder)
+
+
 def killed_and_resumed(folder: Path, rng: random.Random, times: int, *, workers: int) -> int:
     """Run with that many kills at random moments, then to the end; how many kills hit a run."""
     hits, latest = 0, 6.0
@@ -232,8 +251,9 @@ def killed_and_resumed(folder: Path, rng: random.Random, times: int, *, workers:
     return hits
 
 
-@pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
-def test_a_run_that_is_killed_and_taken_up_again_gives_the_same_files(
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_run_that_is_killed_at_random_moments_and_taken_up_again_gives_the_same_files(
     alone: Results, tmp_path: Path, workers: int
 ) -> None:
     folder = tmp_path / "killed"

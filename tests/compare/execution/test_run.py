@@ -36,7 +36,7 @@ def test_a_run_that_lacks_a_cell_makes_the_same_again_and_leaves_the_others(
     copy.path(cell).unlink()
     before = modified(copy)
 
-    again = run_experiment(copy.experiment, copy.folder, workers=2, progress=False)
+    again = run_experiment(copy.experiment, copy.folder, workers=1, progress=False)
 
     xr.testing.assert_identical(again.strides(cell), comparison.strides(cell))
     after = modified(again)

@@ -49,6 +49,17 @@ worn = house_of_laws.things:worn
 hardest_landing = house_of_laws.things:landing
 """
 
+MARK = "and now the comparison"
+PROGRAM = f"""
+import sys
+from pronk_pin.cli import main
+if __name__ == "__main__":
+    for kind in ("controllers", "robots", "scenarios", "metrics"):
+        main(["list", kind])
+    print("{MARK}")
+    sys.exit(main(sys.argv[1:]))
+"""
+
 
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
@@ -82,20 +93,18 @@ def python(site: Path, *words: str) -> str:
 def test_what_a_package_announces_is_listed_and_run_by_name(
     site: Path, twin: GaitLibrary, tmp_path: Path
 ) -> None:
-    kinds = ("controllers", "robots", "scenarios", "metrics")
-    lists = f"from pronk_pin.cli import main; [main(['list', kind]) for kind in {kinds}]"
-    listed = {line.split()[0] for line in python(site, "-c", lists).splitlines()}
-    assert listed > {"house-law", "twin", "worn", "hardest_landing", "ilc", "a1", "nominal"}
     folder = tmp_path / "result"
     gaits = twin.save(tmp_path / "gaits.npz")
     words = [
-        *("-m", "pronk_pin", "compare", "--robot", "twin", "--gaits", str(gaits)),
-        *("--speeds", "0", "0.3", "--controllers", "pd", "house-law"),
+        *("compare", "--robot", "twin", "--gaits", str(gaits)),
+        *("--speeds", "0.3", "--controllers", "pd", "house-law"),
         *("--scenarios", "worn+slope=0.05", "--metrics", "hardest_landing"),
         *("--schedule.startup", "0.2", "--schedule.baseline", "1", "--schedule.learning", "0.5"),
         *("--workers", "2", "--folder", str(folder)),
     ]
-    printed = python(site, *words)
+    lists, printed = python(site, "-c", PROGRAM, *words).split(MARK)
+    listed = {line.split()[0] for line in lists.splitlines()}
+    assert listed > {"house-law", "twin", "worn", "hardest_landing", "ilc", "a1", "nominal"}
     assert "robot twin" in printed
     summary = (folder / "summary.csv").read_text()
     for name in ("twin", "house-law", "worn+slope=0.05", "hardest_landing"):

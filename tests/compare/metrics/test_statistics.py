@@ -41,11 +41,14 @@ def summary(peaks: dict[str, Array], *, fallen: dict[str, Array] | None = None) 
     return pd.DataFrame(rows)[COLUMNS]
 
 
+@pytest.mark.parametrize("trials", [250, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("n", [8, 14, 20])
 @pytest.mark.parametrize("skewed", [False, True])
-def test_intervals_hold_the_truth_about_as_often_as_they_say(n: int, skewed: bool) -> None:
+def test_intervals_hold_the_truth_about_as_often_as_they_say(
+    n: int, skewed: bool, trials: int
+) -> None:
     """Means, paired differences and reductions of n units, over and over again."""
-    rng, trials = np.random.default_rng(7), 1000
+    rng = np.random.default_rng(7)
     hits = np.zeros(3)
     for _ in range(trials):
         factor = rng.gamma(4.0, 0.25, (n, 2)) if skewed else rng.normal(1.0, 0.3, (n, 2))

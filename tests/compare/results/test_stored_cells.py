@@ -266,7 +266,21 @@ def test_the_folder_alone_goes_on_and_options_add(
     before = modified(copy)
     assert main(["compare", "--folder", str(copy.folder)]) == 0
     assert modified(copy) == before
-    assert main(["compare", "--folder", str(copy.folder), "--controllers", "pd", "model"]) == 0
+    assert (
+        main(
+            [
+                "compare",
+                "--folder",
+                str(copy.folder),
+                "--workers",
+                "1",
+                "--controllers",
+                "pd",
+                "model",
+            ]
+        )
+        == 0
+    )
     assert set(modified(copy)) - set(before) == {"model_nominal_0.nc"}
     capsys.readouterr()
     assert main(["compare", "--folder", str(copy.folder), "--schedule.learning", "3"]) == 1

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pronk_pin._typing import Array, IntArray
+from pronk_pin._workers import listening
 from pronk_pin.compare import Results, Schedule, Simulation, load_scenario
 from pronk_pin.compare.simulation.log import StrideLog
 from pronk_pin.compare.simulation.quantities import LAST, STRIDE_QUANTITIES
@@ -274,3 +275,13 @@ def test_the_ticks_kept_are_those_of_the_last_strides(pronking: StrideLog) -> No
         force = ticks["tick_force"][k, -kept:]
         assert np.nanmax(np.abs(force[:, 1, 40:120])) == 0.0  # in the middle of flight
         assert np.all(np.nanmedian(force[:, 0, 20:100, :, 2], axis=(0, 1)) > 20.0)  # feet stand
+
+
+def test_whoever_listens_is_told_of_the_steps_of_all_robots(
+    simulation: Callable[..., Simulation],
+) -> None:
+    told: list[int] = []
+    with listening(told.append):
+        simulation(PD, seconds=1.2).run()
+    assert sum(told) == 2 * 1200
+    assert len(told) > 1  # while it went on

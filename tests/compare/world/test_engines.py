@@ -346,6 +346,32 @@ def test_a_push_gives_its_impulse_to_the_trunks_centre_of_mass(
     np.testing.assert_allclose(momentum[81][3:], moment, atol=0.05 * np.abs(moment).max())
 
 
+def test_a_push_that_is_asked_for_is_the_same_as_one_that_is_planned(
+    engine: Engine, robot: Robot
+) -> None:
+    pushed = replace(IDEAL, push_impulse=(3.0, 0.0, 1.0), push_period=0.06, push_duration=0.02)
+    zero, row = np.zeros((1, 60, 12)), np.zeros(1, dtype=np.intp)
+    usual = in_the_air(engine, robot, IDEAL)
+    if engine.name not in ENGINES:
+        with pytest.raises(InvalidInput, match="cannot push"):
+            usual.push(row, np.array([-3.0, 0.0, -1.0]), 0.02)
+        return
+    planned = play(in_the_air(engine, robot, pushed), np.zeros((1, 100, 12)))
+    usual.advance(row, usual.play(row, zero), np.array([60]))
+    usual.push(row, np.array([3.0, 0.0, 1.0]), 0.02)
+    for ticks in (15, 25):  # the second piece begins while the push acts, and outlasts it
+        usual.play(row, zero)  # which uses nothing up
+        motion = usual.play(row, zero[:, :ticks])
+        usual.advance(row, motion, np.array([ticks]))
+    last = planned.base_rate[:, -1], planned.joints[:, -1]
+    for got, wanted in zip((motion.base_rate[:, -1], motion.joints[:, -1]), last, strict=True):
+        np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-12)
+    still = in_the_air(engine, robot, IDEAL)
+    assert (
+        motion.base_rate[0, -1, 0] > 0.1 + play(still, np.zeros((1, 100, 12))).base_rate[0, -1, 0]
+    )
+
+
 def test_the_ground_carries_the_weight_of_a_standing_robot(engine: Engine, robot: Robot) -> None:
     world = on_the_ground(engine, robot, replace(NOMINAL, payload=2.0), seconds=1.0)
     weight = (robot.mass + 2.0) * robot.gravity

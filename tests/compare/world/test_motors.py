@@ -81,3 +81,15 @@ def test_nobody_is_pushed_before_the_first_period_is_over() -> None:
     scenario = replace(IDEAL, push_impulse=(3.0, 0.0, 0.0), push_period=2.0)
     assert not push_force(scenario, np.array([0.0, 1.0, 1.999])).any()
     assert push_force(scenario, np.array([2.0])).any()
+
+
+@pytest.mark.parametrize("delay", [0, 1, 3, 6])
+def test_commands_on_their_way_arrive_when_the_delay_changes(delay: int) -> None:
+    rows, on_their_way = np.arange(2), np.arange(72.0).reshape(2, 3, 12)
+    before, limit = Motors(replace(IDEAL, delay=0.003), np.full(12, 99.0), 2), np.full(12, 99.0)
+    before.command(rows, on_their_way, np.array([3, 3]))
+    after = Motors(replace(IDEAL, delay=0.001 * delay), limit, 2)
+    last = np.full((2, 12), -1.0)
+    after.take_over(before, last)
+    wanted = np.concatenate([np.repeat(last[:, None], 3, axis=1), on_their_way], axis=1)
+    np.testing.assert_array_equal(after.coming(rows, 10), wanted[:, 6 - delay :])

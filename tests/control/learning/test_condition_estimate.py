@@ -92,3 +92,61 @@ def test_later_strides_are_averaged_and_robots_are_told_apart() -> None:
     estimate.update(ONE + 1, speed, library.at(speed, {"slope": 0.0}))
     assert 0.0 < estimate.values[1, 0] < 0.1
     assert estimate.strides.tolist() == [0, FIRST_STRIDES + 1]
+
+
+def test_a_later_stride_counts_three_tenths() -> None:
+    library, speed = library_of({"slope": SLOPES}), np.array([0.25])
+    estimate = ConditionEstimate(library, 1)
+    for _ in range(FIRST_STRIDES):
+        estimate.update(ONE, speed, library.at(speed, {"slope": 0.1}))
+    estimate.update(ONE, speed, library.at(speed, {"slope": 0.0}))
+    assert estimate.values[0, 0] == pytest.approx(0.7 * 0.1)
+
+
+def constant_library(torque: Array, conditions: dict[str, Array]) -> TorqueLibrary:
+    """The same torques at both speeds, (m_1 .. m_d, 2, samples, 12)."""
+    both = np.stack([torque] * len(SPEEDS))
+    shape = both.shape[:-3]
+    return TorqueLibrary(SPEEDS, both, np.zeros_like(both), np.full(shape, 0.2), None, conditions)
+
+
+def test_a_piece_is_not_followed_beyond_its_end() -> None:
+    first, second = np.zeros((2, 2, SAMPLES, 12))
+    first[..., 0], second[..., 1] = 1.0, 1.0
+    library = constant_library(np.stack([0.0 * first, first, first + second]), {"slope": SLOPES})
+    estimate = ConditionEstimate(library, 1)
+    estimate.update(ONE, SPEEDS[:1], 2.0 * first[None])
+    assert estimate.values[0, 0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_conditions_whose_torques_are_alike_are_told_apart() -> None:
+    rng = np.random.default_rng(5)
+    one, own = rng.normal(size=(2, 2, SAMPLES, 12))
+    other = 0.8 * one + 0.6 * own
+    slopes, loads = (x.reshape(-1, 1, 1, 1) for x in (SLOPES / 0.2, LOADS / 3.0))
+    torque = (slopes * one)[:, None] + (loads * other)[None]
+    library = constant_library(torque, {"slope": SLOPES, "payload": LOADS})
+    estimate, place = ConditionEstimate(library, 1), {"slope": 0.05, "payload": 0.6}
+    estimate.update(ONE, SPEEDS[:1], library.at(SPEEDS[:1], place))
+    assert estimate.values[0] == pytest.approx(list(place.values()), abs=1e-3)
+
+
+def test_conditions_that_need_nearly_the_same_torque_are_told_apart() -> None:
+    """Of a correlation of 0.99, from a torque that is exactly one of them."""
+    rng = np.random.default_rng(1)
+    one, other = rng.normal(size=(2, 2, SAMPLES, 12))
+    changes = [one, 0.99 * one + np.sqrt(1.0 - 0.99**2) * other]
+    slopes, loads = np.linspace(0.0, 1.0, 3), np.linspace(0.0, 1.0, 3)
+    torque = slopes[:, None, None, None, None] * changes[0]
+    torque = torque + loads[:, None, None, None] * changes[1]
+    torque = np.stack([torque, torque])
+    library = TorqueLibrary(
+        SPEEDS,
+        torque,
+        np.zeros_like(torque),
+        np.full((2, 3, 3), 0.2),
+        conditions={"slope": slopes, "payload": loads},
+    )
+    estimate, speed = ConditionEstimate(library, 1), SPEEDS[:1]
+    estimate.update(ONE, speed, library.at(speed, {"slope": 0.9, "payload": 0.2}))
+    np.testing.assert_allclose(estimate.values[0], [0.9, 0.2], atol=0.02)

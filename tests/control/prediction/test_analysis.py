@@ -20,6 +20,7 @@ from pronk_pin.control.prediction.analysis import (
     iteration,
     predict,
     quasi_static,
+    symmetric_basis,
 )
 
 SAMPLES = 60
@@ -47,7 +48,7 @@ def toy() -> Model:
 def test_powers_of_the_operator_are_what_the_strides_do() -> None:
     model = toy()
     law = NormOptimalILC(change=1.0, effort=0.1, splines=None).with_models([model])
-    operator = iteration(law, model, np.eye(3 * SAMPLES))
+    operator = iteration(law, model, symmetric_basis(SAMPLES, 3))
     none = model.record(*np.zeros((3, 3 * SAMPLES)))
     u = np.random.default_rng(1).normal(size=(1, SAMPLES, 3))
     state = np.zeros((1, 2))

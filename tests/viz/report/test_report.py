@@ -26,6 +26,7 @@ from pronk_pin.compare.results.manifest import Manifest
 from pronk_pin.errors import FileProblem
 from pronk_pin.robot.formats.urdf import mujoco_spec
 from pronk_pin.viz.report import write_figures, write_report
+from pronk_pin.viz.report.document import Document
 
 EXPERIMENT = Experiment(
     speeds=(0.0, 0.4),
@@ -99,13 +100,6 @@ def test_markdown_shows_figures_that_are_there(result: Results) -> None:
         assert (result.folder / picture).stat().st_size > 1000, picture
 
 
-def test_the_same_result_gives_the_same_report(result: Results, tmp_path: Path) -> None:
-    copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
-    write_report(copy, command=command_line(EXPERIMENT))
-    for name in ("report.html", "report.md"):
-        assert (copy.folder / name).read_bytes() == (result.folder / name).read_bytes()
-
-
 def test_the_report_is_the_same_whenever_and_by_however_many_workers_it_is_made(
     result: Results, tmp_path: Path
 ) -> None:
@@ -175,7 +169,10 @@ def test_limitations_are_those_of_this_run(result: Results, tmp_path: Path) -> N
     assert "trunk is locked" not in text
 
 
-def test_a_report_that_cannot_be_written_is_reported(result: Results, tmp_path: Path) -> None:
+def test_a_report_that_cannot_be_written_is_reported(
+    result: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pronk_pin.viz.report.report.report", lambda *_, **__: Document("short"))
     copy = Results(shutil.copytree(result.folder, tmp_path / "copy"), result.experiment)
     shutil.rmtree(copy.folder / "figures")
     (copy.folder / "figures").write_text("in the way")
@@ -229,7 +226,9 @@ def test_a_command_of_many_lines_can_be_pasted(result: Results) -> None:
     )
 
 
-def test_sampled_worlds_are_one_family_and_each_has_its_line(tmp_path: Path) -> None:
+def test_sampled_worlds_are_one_family_and_each_has_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     names = tuple(world.name for world in random_scenarios(8, seed=2))
     experiment = replace(
         EXPERIMENT,
@@ -250,6 +249,7 @@ def test_sampled_worlds_are_one_family_and_each_has_its_line(tmp_path: Path) -> 
     for figure in ("random-2-by-world", "learning-calf", "learning-thigh"):
         assert (results.folder / "figures" / f"{figure}.svg").stat().st_size > 1000
     assert not re.search(r"\bnan\b", text)
+    monkeypatch.setattr("pronk_pin.viz.report.report.save_figure", lambda _, path: path)
     written = {path.name for path in write_figures(results, tmp_path / "figures")}
     assert "random-2-by-world.pdf" in written
 

@@ -110,7 +110,11 @@ def build_library(
     cells = {cell.scenario: cell for cell in experiment.cells()}
     learned = [_learned(results, cells[world.name], world.name) for world in worlds]
     home = {name: _home(scenario, name, axis) for name, axis in values.items()}
-    return replace(TorqueLibrary.joined(learned, values, home=home), robot=experiment.model.name)
+    return replace(
+        TorqueLibrary.joined(learned, values, home=home),
+        robot=experiment.model.name,
+        gaits=tuple(gait.sha256 for gait in experiment.planned),
+    )
 
 
 def in_conditions(scenario: Scenario, conditions: Mapping[str, float]) -> Scenario:
@@ -135,7 +139,7 @@ def describe_library(library: TorqueLibrary) -> str:
         axis = library.speeds if name == "speed" else library.conditions[name]
         inner = zip(axis[1:-1], errors, strict=True)
         told = ", ".join(f"{error:.0%} at {value:g}" for value, error in inner)
-        lines.append(f"  {name:<12} {told or 'two values only: unknown'}")
+        lines.append(f"  {name:<12} {told or 'unknown, of fewer than three values'}")
     return "\n".join(lines)
 
 

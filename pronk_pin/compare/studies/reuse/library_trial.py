@@ -75,7 +75,7 @@ def measure_library(
         )
     points = whole("points", points, Interval(1, 10_000))
     machine, gait_library = machine_and_gaits(robot, gaits)
-    check_library(library, machine)
+    check_library(library, machine, lambda speeds: [gait_library.at(v) for v in speeds])
     axes = {"speed": library.speeds, **library.conditions}
     places = [
         {name: float(rng.uniform(axis[0], axis[-1])) for name, axis in axes.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from ...world import Scenario
 from ..learning_runs import (
     COMPARED,
     learn,
+    learning_law,
     machine_and_gaits,
     peaks_by_stride,
     speeds_with_neighbours,
@@ -36,6 +38,7 @@ def measure_seeding(
     speeds: Sequence[float],
     scenario: Scenario,
     *,
+    spec: ControllerSpec | None = None,
     robot: str | RobotSpec = "a1",
     gaits: str | GaitLibrary = "pronk",
 ) -> pd.DataFrame:
@@ -45,21 +48,28 @@ def measure_seeding(
         speeds: Increasing speeds [m/s], three or more. The library is learned at all of them,
             and each inner one begins with what its neighbours learned.
         scenario: The scenario.
+        spec: A controller whose laws learn; by default `ilc`.
         robot: The robot, and
         gaits: its gaits, as an `Experiment` takes them.
 
     Returns:
-        A row for each controller of `LEARNERS`, speed and stride: `controller`, `speed`, `stride`
-        (of learning; 0 is the last before it), peak stance errors `thigh` and `calf`, means over
-        the legs [rad], and whether the robot stayed `upright`.
+        A row for each controller of `LEARNERS`, with these laws, speed and stride: `controller`,
+        `speed`, `stride` (of learning; 0 is the last before it), peak stance errors `thigh` and
+        `calf`, means over the legs [rad], and whether the robot stayed `upright`.
 
     Raises:
-        InvalidInput: There are fewer than three speeds, or they do not increase.
+        InvalidInput: There are fewer than three speeds, they do not increase, or the controller
+            does not learn.
     """
+    spec = load_controller("ilc") if spec is None else spec
+    learning_law(spec)
     speeds = speeds_with_neighbours("seeding", speeds)
     machine, library = machine_and_gaits(robot, gaits)
     learned = [library.at(speed) for speed in speeds]
-    specs = [load_controller(name) for name in LEARNERS]
+    specs = [
+        replace(spec, name=name, source=load_controller(name).source, library="", library_sha256="")
+        for name in LEARNERS
+    ]
     inner = learned[1:-1]
     stored = torque_library(learn(machine, learned, specs[0], scenario))
     tables = []

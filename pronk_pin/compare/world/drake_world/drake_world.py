@@ -17,7 +17,6 @@ from ...._typing import Array, BoolArray, IntArray
 from ....control import Gains
 from ....robot import Robot
 from ..engine import Motion
-from ..motors import push_force
 from ..scenario import Scenario
 from ..state_world import StateWorld
 from .drake_trunk import DrakeTrunk
@@ -73,10 +72,12 @@ class DrakeWorld(StateWorld):
         path[:, 0] = self._state[rows]
         path[..., 0] = path[:, :1, 0] + self.scenario.timestep * np.arange(ticks + 1)
         force = np.zeros((m, ticks, *self.force.shape[1:]))
-        pushes = push_force(self.scenario, path[:, :-1, 0]) if self.scenario.pushes else [None] * m
+        pushes = self._push_force(rows, path[:, 0, 0], ticks)
         applied = np.zeros((m, ticks, self._nv))
         applied[..., self._plant.rates] = self._constant * control
-        for robot in zip(path, applied, force, pushes, strict=True):
+        for robot in zip(
+            path, applied, force, [None] * m if pushes is None else pushes, strict=True
+        ):
             self._roll(*robot)
         return self._motion(path, force, _finite(path[:, 1:]))
 

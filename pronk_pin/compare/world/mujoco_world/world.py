@@ -16,7 +16,6 @@ from ...._typing import Array, BoolArray, IntArray
 from ....control import Gains
 from ....robot import Robot
 from ..engine import Engine, Motion, World
-from ..motors import push_force
 from ..scenario import Scenario
 from ..state_world import StateWorld
 from .model import build_model
@@ -79,7 +78,6 @@ class MujocoWorld(StateWorld):
         address = [model.sensor(name).adr[0] for name in robot.foot_names]
         self._force = np.array(address)[:, None] + np.arange(3)
         # Forces on the bodies come after the motors' controls: force and moment, in the world.
-        self._control = int(_CONTROL | _PUSHED if scenario.pushes else _CONTROL)
         body = model.body(robot.spec.base_link).id
         self._push = model.nu + 6 * body + np.arange(3)
 
@@ -101,11 +99,12 @@ class MujocoWorld(StateWorld):
         m, ticks = control.shape[:2]
         path = np.empty((m, ticks + 1, self._state.shape[1]))
         path[:, 0] = self._state[rows]
-        controls = np.zeros((m, ticks, mujoco.mj_stateSize(self.model, self._control)))
+        push = self._push_force(rows, path[:, 0, 0], ticks)
+        spec = int(_CONTROL if push is None else _CONTROL | _PUSHED)
+        controls = np.zeros((m, ticks, mujoco.mj_stateSize(self.model, spec)))
         controls[..., self._ctrl] = control
-        if self.scenario.pushes:
-            time = path[:, :1, 0] + self.scenario.timestep * np.arange(ticks)  # (m, ticks)
-            controls[..., self._push] = push_force(self.scenario, time)
+        if push is not None:
+            controls[..., self._push] = push
         states = np.empty((m, ticks, path.shape[2]))
         sensors = np.empty((m, ticks, self.model.nsensordata))
         self._rollout.rollout(
@@ -113,7 +112,7 @@ class MujocoWorld(StateWorld):
             [self._data],
             path[:, 0].copy(),
             controls,
-            control_spec=self._control,
+            control_spec=spec,
             skip_checks=True,
             nstep=ticks,
             initial_warmstart=self._warmstart[rows],

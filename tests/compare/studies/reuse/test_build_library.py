@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -189,3 +190,35 @@ def test_only_what_begins_with_a_library_takes_a_file(hills: Path) -> None:
         load_controller(f"pd={hills}")
     with pytest.raises(FileProblem):
         load_controller("library=nowhere.npz")
+
+
+def test_an_equals_sign_without_a_file_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="names no file"):
+        load_controller("library=")
+
+
+def test_a_library_of_other_gaits_is_refused_before_anything_is_simulated(
+    hills: Path, tmp_path: Path
+) -> None:
+    """Of another apex, of gaits for a trunk that may turn, or of gaits that do not go so far."""
+    asked: list[dict[str, Any]] = [{"apex": 0.35}, {"base": "sagittal"}, {"base": "free"}]
+    for other in asked:
+        experiment = Experiment(
+            speeds=(0.1,), controllers=("pd", f"library={hills}"), schedule=SHORT, **other
+        )
+        with pytest.raises(InvalidInput, match="learned for other gaits"):
+            run_experiment(experiment, tmp_path / "other", workers=1, progress=False)
+        assert not (tmp_path / "other").exists()
+
+
+def test_names_of_files_that_cannot_name_a_controller_are_refused_with_the_remedy(
+    hills: Path, tmp_path: Path
+) -> None:
+    odd = tmp_path / "my hills.npz"
+    odd.write_bytes(hills.read_bytes())
+    with pytest.raises(InvalidInput, match="rename it"):
+        load_controller(f"library={odd}")
+    same = tmp_path / "hills.npz"
+    same.write_bytes(hills.read_bytes())
+    with pytest.raises(InvalidInput, match="its name counts, not its folder"):
+        Experiment(controllers=(f"library={hills}", f"library={same}"))

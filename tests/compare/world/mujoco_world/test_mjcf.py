@@ -222,7 +222,9 @@ SMALL = Experiment(
 def run(robot: Robot, tmp_path: Path) -> Results:
     """A small comparison in the world of an MJCF."""
     path = mjcf(robot, tmp_path / "robot.xml")
-    return run_experiment(replace(SMALL, mjcf=str(path)), tmp_path / "run", progress=False)
+    return run_experiment(
+        replace(SMALL, mjcf=str(path)), tmp_path / "run", workers=1, progress=False
+    )
 
 
 def test_a_result_keeps_what_the_file_had_otherwise_and_is_read_without_it(
@@ -235,7 +237,9 @@ def test_a_result_keeps_what_the_file_had_otherwise_and_is_read_without_it(
     assert results.foreign is not None
     assert results.foreign.path == str(path)
     assert results.foreign.parity.table(full=True) == parity.table(full=True)
-    again = run_experiment(results.experiment, run.folder, progress=False)  # all is there
+    again = run_experiment(
+        results.experiment, run.folder, workers=1, progress=False
+    )  # all is there
     assert len(again.summary())
 
 
@@ -246,13 +250,13 @@ def test_a_result_is_completed_with_the_same_file_and_no_other(robot: Robot, run
     as_it_was = path.read_text()
     path.write_text(as_it_was.replace('damping="0.7"', 'damping="0.8"'))
     with pytest.raises(FileProblem, match="was begun with; put the old file back") as caught:
-        run_experiment(run.experiment, run.folder, progress=False)
+        run_experiment(run.experiment, run.folder, workers=1, progress=False)
     assert caught.value.path == path
     path.unlink()
     with pytest.raises(FileProblem, match=r"robot.xml: missing"):
-        run_experiment(run.experiment, run.folder, progress=False)
+        run_experiment(run.experiment, run.folder, workers=1, progress=False)
     path.write_text(as_it_was)
-    run_experiment(run.experiment, run.folder, progress=False)
+    run_experiment(run.experiment, run.folder, workers=1, progress=False)
     assert run.path(cell).read_bytes() == strides
 
 
@@ -260,10 +264,10 @@ def test_a_file_that_cannot_be_taken_leaves_no_folder(robot: Robot, tmp_path: Pa
     path = tmp_path / "robot.xml"
     experiment = replace(SMALL, mjcf=str(path))
     with pytest.raises(FileProblem, match=r"robot.xml: missing"):
-        run_experiment(experiment, tmp_path / "run", progress=False)
+        run_experiment(experiment, tmp_path / "run", workers=1, progress=False)
     mjcf(load_robot("solo12"), path)
     with pytest.raises(InvalidInput, match="has no joint FL_hip_joint, FL_thigh_joint"):
-        run_experiment(experiment, tmp_path / "run", progress=False)
+        run_experiment(experiment, tmp_path / "run", workers=1, progress=False)
     assert not (tmp_path / "run").exists()
 
 
@@ -290,7 +294,7 @@ def test_a_damaged_record_of_the_file_is_refused_and_made_again(run: Results, da
     path.unlink()
     with pytest.raises(FileProblem, match=r"parity.json: missing; run the same"):
         _ = run.foreign
-    run_experiment(run.experiment, run.folder, progress=False)
+    run_experiment(run.experiment, run.folder, workers=1, progress=False)
     assert path.read_bytes() == whole
 
 
