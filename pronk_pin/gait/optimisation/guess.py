@@ -16,7 +16,7 @@ from .unfold import fold_problem
 def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
     """A crude first guess: the trunk hops on parabolas, the legs keep the standing posture.
 
-    On a free trunk they swing to and fro, as far as the trunk goes while they stand.
+    Without a flight they swing to and fro, as far as the trunk goes while they stand.
 
     Returns:
         The unknowns of the transcription, each (nodes, rows).
@@ -43,7 +43,7 @@ def vertical_hop(problem: GaitProblem) -> dict[str, Array]:
         x = start + problem.speed * duration * s
         pitch = np.zeros((len(s), model.nb - 2))
         legs = np.tile(standing, (len(s), 1))
-        if problem.base == "free":
+        if not flights:  # a trot is found from legs that keep still, and not from these
             legs[:, 1::3] += _sweep(problem, durations, index, s)
         q = np.column_stack([x, z, pitch, legs])
         v = np.gradient(q, s * duration, axis=0)
