@@ -331,3 +331,9 @@ def test_a_push_from_before_a_reset_does_not_come_after_it() -> None:
         go.set()
         wait_for(lambda: len(done) > 3)
     assert done[2:4] == done[:2]
+
+
+def test_a_skill_of_another_robot_is_refused_by_name() -> None:
+    other = LiveSession(Experiment(robot="go1", controllers=("ilc",)))
+    with pytest.raises(InvalidInput, match=r"is of go1.*this is a1"):
+        session("ilc").load_skill(0, other.skill(0))
