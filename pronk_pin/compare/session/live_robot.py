@@ -350,10 +350,11 @@ class LiveRobot:
         """
         shape = (len(PARTS), SAMPLES, self._robot.nu)
         if skill.torque.shape[-3:] != shape or skill.robot not in ("", self._robot.name):
-            whose = f" of {skill.robot}" if skill.robot else ""
+            whose = skill.robot or "another robot"
             raise InvalidInput(
-                f"the skill{whose} has torques of shape {skill.torque.shape[-3:]} at each speed, "
-                f"and this robot plays {shape}; load one that it has learned"
+                f"the skill is of {whose}, with torques of shape {skill.torque.shape[-3:]} at each "
+                f"speed, and this is {self._robot.name}, which plays {shape}; load one that it has "
+                "learned"
             )
 
     def begin_recording(self) -> None:

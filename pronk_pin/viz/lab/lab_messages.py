@@ -6,7 +6,8 @@ from typing import TypeAlias
 
 import msgspec
 
-from ...compare.session import LiveSession
+from ..._checks import known_name
+from ...compare.session import LIVE_CONTROLLERS, LiveSession
 from ...errors import InvalidInput
 
 LONGEST = 2048
@@ -127,6 +128,9 @@ def obey(session: LiveSession, asked: Asked) -> None:
         case SetLearning(on, robot):
             session.set_learning(on, robot)
         case SetController(robot, name):
+            # Names only: a page opens no file of this machine.
+            shown = (spec.name for spec in session.controllers)
+            known_name("controller of a live session", name, (*LIVE_CONTROLLERS, *shown))
             session.set_controller(robot, name)
         case SetWorld(values):
             session.set_mismatches(values)

@@ -255,7 +255,13 @@ class LabServer(LiveServer):
         """
         with temporary_folder() as folder:
             write_file(folder / "skill.npz", data)
-            skill = TorqueLibrary.load(folder / "skill.npz")
+            try:
+                skill = TorqueLibrary.load(folder / "skill.npz")
+            except PronkError:  # which names a file that is none of whoever sent it
+                raise InvalidInput(
+                    "the file is no torque library, or damaged; load one that was saved here, or "
+                    "made by pronk-pin ilc build-library"
+                ) from None
         self.session.load_skill(robot, skill)
         self._tell_state()
 

@@ -16,6 +16,7 @@ import pytest
 from pronk_pin.compare import Experiment, Results
 from pronk_pin.compare.metrics import stride_table
 from pronk_pin.compare.session import LiveSession, LiveStride, Moment, live_robot
+from pronk_pin.compare.session.live_clock import LiveClock
 from pronk_pin.control import TorqueLibrary
 from pronk_pin.errors import InvalidInput, SpeedOutOfRange, UnknownName
 
@@ -331,3 +332,18 @@ def test_a_push_from_before_a_reset_does_not_come_after_it() -> None:
         go.set()
         wait_for(lambda: len(done) > 3)
     assert done[2:4] == done[:2]
+
+
+def test_a_skill_of_another_robot_is_refused_by_name() -> None:
+    other = LiveSession(Experiment(robot="go1", controllers=("ilc",)))
+    with pytest.raises(InvalidInput, match=r"is of go1.*this is a1"):
+        session("ilc").load_skill(0, other.skill(0))
+
+
+def test_a_clock_that_robots_cannot_follow_goes_back_to_them() -> None:
+    clock = LiveClock()
+    clock.paused = False
+    clock.set(5.0)
+    clock.wait(1.0, threading.Event())
+    assert clock.now == pytest.approx(1.0, abs=0.2)
+    assert clock.slipped == pytest.approx(4.0, abs=0.2)

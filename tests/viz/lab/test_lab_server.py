@@ -146,6 +146,7 @@ def test_a_wrong_message_is_answered_and_one_that_is_too_long_ends_the_connectio
             ({"do": "speed", "speed": 1e9}, "outside"),
             ({"do": "world", "values": {"wind": 1.0}}, "unknown mismatch 'wind'"),
             ({"do": "controller", "robot": 0, "name": "ilc"}, "another robot has"),
+            ({"do": "controller", "robot": 0, "name": "library=/etc/hosts"}, "unknown controller"),
             ({"do": "push", "robot": 9, "impulse": [1, 0, 0]}, "robot"),
             ({"do": "record", "on": False}, "nothing is recorded"),
         ):
@@ -388,6 +389,7 @@ def test_a_skill_is_saved_and_loaded_as_a_file(lab: LabServer, browser: Eye) -> 
         ".then((a) => a.text())"
     )
     assert "torque library" in wrong
+    assert "/" not in wrong, "no path of this machine"
     post = urllib.request.Request(f"{lab.url}skill?robot=1&{token}", data=data, method="POST")
     with pytest.raises(urllib.error.HTTPError):
         urllib.request.urlopen(post)
