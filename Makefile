@@ -1,6 +1,7 @@
 # make compare   run the comparison of the paper, print the table, write report and replay
 # make test      run the tests
 # make mutants   put faults into the package one at a time, and see whether tests notice: hours
+# make benchmarks  measure how fast it is, and print a table
 # make docs      build the documentation as a site, in site/
 # make figures   make the figures in the documents again, by their commands; DOCUMENTS=docs/engines.md for one page
 # All create .venv by themselves; a Python of 3.10 to 3.13 and a package index are enough.
@@ -9,7 +10,7 @@ BIN := .venv/bin
 ARGS ?=
 DOCUMENTS ?= README.md $(wildcard docs/*.md)
 
-.PHONY: compare test mutants lint docs figures clean
+.PHONY: compare test mutants benchmarks lint docs figures clean
 
 compare: .venv/.installed
 	$(BIN)/pronk-pin compare $(ARGS)
@@ -19,6 +20,9 @@ test: .venv/.installed-test
 
 mutants: .venv/.installed-test
 	$(BIN)/python benchmarks/mutants.py $(ARGS)
+
+benchmarks: .venv/.installed-test
+	$(BIN)/python benchmarks/speed.py $(ARGS)
 
 lint: .venv/.installed-dev
 	$(BIN)/ruff check .
