@@ -343,11 +343,17 @@ class LiveRobot:
         _playable(controller)
 
     def check_skill(self, skill: TorqueLibrary) -> None:
-        """Check that torques are of this robot.
+        """Check that torques are of this robot, and of its speed alone.
 
         Raises:
             InvalidInput: They are not.
         """
+        if skill.conditions:
+            raise InvalidInput(
+                f"the skill is over {', '.join(skill.conditions)}, too, which is not estimated in "
+                "a live session; load what it holds in one of them, as TorqueLibrary.in_conditions "
+                "gives it"
+            )
         shape = (len(PARTS), SAMPLES, self._robot.nu)
         if skill.torque.shape[-3:] != shape or skill.robot not in ("", self._robot.name):
             whose = skill.robot or "another robot"
@@ -405,6 +411,7 @@ def _playable(controller: ControllerSpec) -> ControllerSpec:
             known_name("controller of a live session", controller.name, LIVE_CONTROLLERS)
         raise InvalidInput(
             f"controller '{controller.name}' needs strides or gaits that are made beforehand, or "
-            "learns by a model of one gait; choose another one, as ilc or model+ilc"
+            "learns by a model of one gait; choose another one, as ilc or model+ilc, and load what "
+            "was learned"
         )
     return replace(load_controller(controller), guard=None)

@@ -372,7 +372,8 @@ class LiveSession:
         self._check_not_recording()
         scenario = self.base_scenario
         if values:
-            words = "+".join(f"{name}={float(value)!r}" for name, value in values.items())
+            numbers = {name: repr(float(value)) for name, value in values.items()}
+            words = "+".join(f"{name}={text}" for name, text in numbers.items()).replace("e+", "e")
             nominal = scenario == load_scenario("nominal")
             scenario = load_scenario(words) if nominal else scenario + load_scenario(words)
         self._values, self._scenario = dict(values), scenario

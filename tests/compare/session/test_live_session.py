@@ -347,3 +347,38 @@ def test_a_clock_that_robots_cannot_follow_goes_back_to_them() -> None:
     clock.wait(1.0, threading.Event())
     assert clock.now == pytest.approx(1.0, abs=0.2)
     assert clock.slipped == pytest.approx(4.0, abs=0.2)
+
+
+def test_a_skill_over_conditions_is_refused_and_so_are_numbers_beyond_all_scenarios() -> None:
+    session = LiveSession(Experiment(controllers=("ilc",)), speed=0.3)
+    flat = session.skill(0)
+    hills = TorqueLibrary.joined([flat, flat], {"slope": np.array([0.0, 0.1])})
+    with pytest.raises(InvalidInput, match="over slope, too"):
+        session.load_skill(0, hills)
+    session.load_skill(0, hills.in_conditions({"slope": 0.1}))
+    with pytest.raises(InvalidInput, match="payload"):
+        session.set_mismatches({"payload": 1e300})
+
+
+def test_a_touchdown_is_late_by_what_the_flight_lasted_longer_than_its_reference() -> None:
+    session = LiveSession(Experiment(controllers=("pd",)), speed=0.3)
+    told = session.stride(4)[0][-1].touchdown
+    log = session.robots[0].simulation.strides
+    last = 0, int(log.count[0]) - 1
+    lasted = log["duration"][last] - log["stance"][last]
+    assert told == pytest.approx(lasted - log["flight_reference"][last], abs=0.001)
+    assert told < -0.002  # without feedforward a robot does not jump as high as it should
+
+
+def test_the_stride_before_a_skill_is_loaded_is_not_learned_from() -> None:
+    session = LiveSession(Experiment(controllers=("ilc",)), speed=0.3)
+    session.stride(2)
+    nothing = session.skill(0)
+    session.set_learning(True)
+    session.stride(4)
+    session.load_skill(0, nothing)
+    session.stride(1)
+    log = session.robots[0].simulation.strides
+    played = log["feedforward"][0, : int(log.count[0])]
+    assert np.abs(played[-2]).max() > 1.0
+    assert np.all(played[-1] == 0.0)

@@ -93,8 +93,12 @@ class Chart {
       const mean = last.reduce((a, b) => a + b, 0) / last.length;
       pen.strokeStyle = robots[k].color; pen.lineWidth = 1.6; pen.setLineDash([5, 3]);
       line(pen, [[left, y(mean)], [width, y(mean)]]);
-      pen.setLineDash([]); pen.fillStyle = robots[k].color; pen.textAlign = "left";
-      pen.fillText("the model's level", left + 3, Math.max(y(mean) - 7, 8));
+      pen.setLineDash([]); pen.textAlign = "left";
+      const label = "the model's level", top = Math.max(y(mean) - 7, 8);
+      pen.fillStyle = "rgba(255, 255, 255, 0.85)";  // on bars nobody could read it
+      pen.fillRect(left + 1, top - 6, pen.measureText(label).width + 4, 12);
+      pen.fillStyle = robots[k].color;
+      pen.fillText(label, left + 3, top);
     }
     pen.lineWidth = 1.2;
     const told = new Set();
