@@ -261,7 +261,7 @@ def test_parity_exits_with_1_where_a_model_differs(
 def test_gaits_plot_draws_the_library(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["gaits", "plot", "0.45", "--format", "svg", "--folder", str(tmp_path)]) == 0
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"a1-pronk-stride.svg", "a1-pronk-side.svg"}
+    assert names == {f"a1-pronk-{kind}.svg" for kind in ("stride", "side", "diagram")}
     assert "A1 at 0.45 m/s" in (tmp_path / "a1-pronk-side.svg").read_text()
     assert str(tmp_path / "a1-pronk-side.svg") in capsys.readouterr().out
 
