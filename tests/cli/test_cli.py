@@ -15,7 +15,7 @@ import pytest
 
 from pronk_pin import cli, load_robot
 from pronk_pin.cli import main
-from pronk_pin.cli.ilc import _covered
+from pronk_pin.cli.ilc_reuse import covered_speeds
 from pronk_pin.gait import SPEEDS
 from pronk_pin.robot import ROBOTS
 from pronk_pin.robot.formats.urdf import mujoco_spec
@@ -316,8 +316,8 @@ def test_bad_input_gets_one_line_with_the_remedy(
 
 
 def test_studies_of_other_robots_begin_with_speeds_that_their_gaits_cover() -> None:
-    assert _covered("bolt", "pronk", (-0.4, -0.2, 0.0, 0.6, 0.8)) == (-0.2, 0.0, 0.6)
-    assert _covered("a1", "pronk", (0.6, 0.8)) == (0.6, 0.8)
+    assert covered_speeds("bolt", "pronk", (-0.4, -0.2, 0.0, 0.6, 0.8)) == (-0.2, 0.0, 0.6)
+    assert covered_speeds("a1", "pronk", (0.6, 0.8)) == (0.6, 0.8)
 
 
 def test_a_file_in_the_way_of_the_folder_is_named(

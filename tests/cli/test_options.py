@@ -21,18 +21,8 @@ from pronk_pin import cli
 from pronk_pin.cli import main
 from pronk_pin.cli.comparison import ExperimentOptions, Explain, Report, Reproduce, ScheduleOptions
 from pronk_pin.cli.gaits import Build, Plot, Show
-from pronk_pin.cli.ilc import (
-    Analyze,
-    BuildLibrary,
-    Drive,
-    Engines,
-    Gains,
-    Seeding,
-    Stability,
-    Transfer,
-    TryLibrary,
-    Wander,
-)
+from pronk_pin.cli.ilc import Analyze, Drive, Gains, Stability, Wander
+from pronk_pin.cli.ilc_reuse import BuildLibrary, Engines, Seeding, Transfer, TryLibrary
 from pronk_pin.cli.parity import Parity
 from pronk_pin.cli.play import Play
 from pronk_pin.cli.view import FilmOptions, View
